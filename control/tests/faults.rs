@@ -206,6 +206,31 @@ fn no_limit_is_exceeded_under_guarantee_after_a_fault() {
 }
 
 #[test]
+fn lasting_errors_and_disturbances_at_their_bounds_contradict_nothing() {
+    for (name, settings, age) in situations() {
+        let corner = Vector3::new(1.0, -1.0, 1.0);
+        let base = flight(&settings, age, 5);
+        let disturbance = Waveform::Constant(corner);
+        let sight = Sight::Errors(Waveform::Constant(-corner));
+        let slow = Some(Slow::new(&settings, Waveform::Constant(corner), -corner));
+        let shown = Flight { disturbance, sight, slow, inertia_scale: 1.05, ..base }.fly();
+        assert!(shown.withdrawn.is_none() && shown.in_force > 0.99, "{name}: {shown:?}");
+    }
+}
+
+#[test]
+fn a_fault_that_lasts_is_not_forgiven() {
+    for situation in situations() {
+        let (_, settings, age) = situation;
+        for size in [2.0, 3.0] {
+            let fault = Fault::Bias(size * DEGREE, 0.0);
+            let shown = Flight { fault, ..flight(&settings, age, 3) }.fly();
+            assert!(shown.in_force < 10.5 / 40.0, "{}, {size}: {shown:?}", situation.0);
+        }
+    }
+}
+
+#[test]
 #[ignore = "minutes: for the table of docs/guarantee.md"]
 fn the_table_of_faults() {
     let count = std::env::var("FLIGHTS").map_or(24, |count| count.parse().unwrap());

@@ -3,7 +3,7 @@
 use crate::solver;
 use control::crmpc::{
     Constraints, Contradiction, Crmpc, GuaranteeStatus, Margins, Memory, POINTS, PlanPoint,
-    Settings, Supervision, points,
+    Settings, Supervision, Tracked, points,
 };
 use control::error::DesignError;
 use control::report::SolverReport;
@@ -34,10 +34,16 @@ pub struct CrmpcLaw {
     supervision: Supervision,
     #[setting(name = "guarantee")]
     margins: Margins,
+    #[setting(name = "tracked")]
+    tracked: Tracked,
     /// Share of limit.moment that remains for the plan at rest, after the reserve for disturbances,
     /// errors and delay.
     #[setting(name = "guarantee.momentLeft")]
     moment_left: f64,
+    /// Time of a turn by 120 deg from rest to rest with what the reserves leave of limit.moment and
+    /// limit.rate; a reference that is that far away is reached about so late.
+    #[setting(name = "guarantee.turnTime", unit = "s", nominal = 30.0)]
+    turn_time: f64,
     /// Gain K of the feedback law in force: factor on the {}.
     #[setting(name = "feedback.gain", each = GAINS, units = ["1/s2", "1/s"], nominal = 5.0)]
     gain: [f64; 2],
@@ -107,7 +113,9 @@ impl Law for CrmpcLaw {
         self.supervision = memory.supervision;
         self.margins =
             Margins { rate: shown(memory.margins.rate), moment: shown(memory.margins.moment) };
+        self.tracked = Tracked { angles: shown_vector(&memory.tracked.angles), ..memory.tracked };
         self.moment_left = shown(memory.moment_left);
+        self.turn_time = shown(memory.turn_time);
         self.gain = [memory.gain.k1, memory.gain.k2];
         self.disturbance = shown_vector(&memory.observed.disturbance);
         self.report = solver::shown_report(&memory.report);

@@ -10,7 +10,11 @@ use crate::error::{DesignError, positive};
 use crate::error_dynamics::{Gain, SampledError};
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 use vehicle::math::{exp, hypot, ln, powi, tan};
+
+/// Turn whose time is told with the settings: the bank reversal of an entry, rad.
+const TURN: f64 = 120.0 * PI / 180.0;
 
 /// The constants printed in Chai 2022, section 5.1, computed from the raw data.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -175,6 +179,19 @@ impl Design {
             smallest_inertia,
             inertia_ratio: largest_inertia / smallest_inertia,
         })
+    }
+}
+
+impl Design {
+    /// Returns the time of a turn of 120° from rest to rest with what is left of both limits, s: at a
+    /// constant acceleration, at the largest rate, and braking. Of the rate, the deviation is
+    /// reserved that can develop until the next optimisation, which begins anew.
+    pub fn turn_time(&self, s: &Settings) -> f64 {
+        let rate = (s.limit_rate - self.tightening.at(self.ratio).rate).max(0.0);
+        let left = self.assessment.moment_left.max(0.0);
+        let acceleration = left * s.limit_moment / self.largest_inertia;
+        let rate = rate.min((TURN * acceleration).sqrt());
+        TURN / rate + rate / acceleration
     }
 }
 

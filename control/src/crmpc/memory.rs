@@ -10,7 +10,8 @@ use crate::error_dynamics::Gain;
 use crate::report::SolverReport;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
-use settings::Declared;
+use settings::{Choice, Declared};
+use vehicle::axes::ANGLES;
 
 /// The state that CRMPC carries from tick to tick.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -42,6 +43,10 @@ pub struct Memory {
     /// Share of the moment limit that the design leaves to the plan at rest, see
     /// [`super::Assessment::moment_left`]; zero with the paper's set.
     pub moment_left: f64,
+    /// Time of a large turn, see [`super::Design::turn_time`], s.
+    pub turn_time: f64,
+    /// Reference that the last optimisation tracks.
+    pub tracked: Tracked,
     /// Gain K of the feedback law.
     pub gain: Gain,
     /// Feedback ticks from the beginning of the nominal trajectory to the beginning of the plan in
@@ -86,6 +91,29 @@ impl Acting {
     pub(super) fn terms(&self) -> Option<Terms> {
         (self.ticks > 0).then_some(self.terms)
     }
+}
+
+/// Reason why a plan does not track the reference itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
+pub enum Instead {
+    /// The reference itself is tracked.
+    #[default]
+    None,
+    /// Its sideslip is too near to guarantee.sideslip or beyond, so that the nearest one that can be
+    /// reached is tracked.
+    Sideslip,
+    /// It is far away, so that a point on the way to it is tracked.
+    OnTheWay,
+}
+
+/// Reference that a plan tracks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Tracked {
+    /// Reference that the plan tracks at its beginning: {}.
+    #[setting(name = "", each = ANGLES, unit = "rad", nominal = 0.1)]
+    pub angles: Vector3<f64>,
+    /// Reason why this is not the reference itself.
+    pub instead: Instead,
 }
 
 /// Margins that the first interval of a plan leaves to the limits, beyond the reserve for

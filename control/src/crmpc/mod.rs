@@ -30,7 +30,7 @@ pub use guarantee::{
     BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Domain, FOURTH, Lemmas, TURN,
 };
 pub use horizon::{POINTS, PlanPoint, points};
-pub use memory::{Acting, Margins, Memory};
+pub use memory::{Acting, Instead, Margins, Memory, Tracked};
 pub use observer::Observed;
 pub use plan::{Plan, Terms};
 pub use set::{Bounds, Posed};
@@ -154,6 +154,10 @@ impl Controller for Crmpc {
             plan: Plan::new(self.settings.horizon),
             moment_left: match self.law {
                 Law::Robust(_) => self.design.assessment.moment_left,
+                Law::Paper(_) => 0.0,
+            },
+            turn_time: match self.law {
+                Law::Robust(_) => self.design.turn_time(&self.settings),
                 Law::Paper(_) => 0.0,
             },
             gain: self.settings.feedback,

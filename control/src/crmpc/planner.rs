@@ -6,7 +6,7 @@
 
 use super::design::Design;
 use super::feedback::Tick;
-use super::memory::Memory;
+use super::memory::{Instead, Memory, Tracked};
 use super::plan::Plan;
 use super::settings::{Constraints, Settings};
 use super::stages::Stages;
@@ -31,6 +31,9 @@ const DISTANCES: [f64; 2] = [20.0 * PI / 180.0, 50.0 * PI / 180.0];
 /// the robust set most intervals of a window are near their bounds, and an iteration costs more.
 const PAPER_MARGIN: f64 = 0.5;
 const ROBUST_MARGIN: f64 = 0.25;
+/// Distance of a reference from the largest |β| at which a plan can rest, as a share of the bound: a
+/// plan that moves there needs it.
+const SIDESLIP_MARGIN: f64 = 0.01;
 
 /// The optimiser with its scratch memory.
 pub(super) struct Planner {
@@ -43,6 +46,10 @@ pub(super) struct Planner {
     shift: Vector3<f64>,
     /// Distance from the measured angles beyond which a reference is replaced, rad.
     pub reach: f64,
+    /// Largest |β| of a reference that a plan can reach, rad.
+    sideslip: f64,
+    /// Reference that the present optimisation tracks, and why.
+    tracked: Tracked,
     /// Measured state (Θ, x_ω) at the optimisation.
     pub measured: Vector6<f64>,
     /// State from which the last optimum was sought.
@@ -87,6 +94,12 @@ impl Planner {
             affine: vec![[Vector3::zeros(); 2]; n],
             shift: Vector3::zeros(),
             reach: if is_of_paper { f64::INFINITY } else { reach },
+            sideslip: if is_of_paper {
+                f64::INFINITY
+            } else {
+                reachable_sideslip(settings, design)
+            },
+            tracked: Tracked::default(),
             measured: Vector6::zeros(),
             start: Vector6::zeros(),
             clock: Instant::now(),
@@ -95,6 +108,9 @@ impl Planner {
 
     /// Begins an optimisation: computes the references at the prediction times, with angles shifted
     /// by `shift` (rad), and d_k = A x_r,k + B Θ̈_r,k − x_r,k+1.
+    ///
+    /// The sideslip of a reference is limited to what a plan can reach, so that an optimum leads to
+    /// the nearest such reference instead of being refused.
     ///
     /// A reference that is too far from the measured angles is replaced by one at rest on the way
     /// to it: an artificial reference as in Limon et al., "MPC for tracking piecewise constant
@@ -107,12 +123,22 @@ impl Planner {
         for (k, slot) in stages.references.iter_mut().enumerate() {
             *slot = (tick.reference)(tick.time + k as f64 * stages.step);
             slot.angles += shift;
+            let mut instead = Instead::None;
+            if slot.angles.y.abs() > self.sideslip {
+                slot.angles.y = self.sideslip.copysign(slot.angles.y);
+                (slot.rates.y, slot.accelerations.y) = (0.0, 0.0);
+                instead = Instead::Sideslip;
+            }
             let measured = &tick.measured.angles;
             let way = slot.angles - measured;
             let distance = way.norm();
             if distance > self.reach {
                 let angles = measured + way * (self.reach / distance);
                 *slot = Reference { angles, ..Reference::default() };
+                instead = Instead::OnTheWay;
+            }
+            if k == 0 {
+                self.tracked = Tracked { angles: slot.angles - shift, instead };
             }
         }
         for (d, pair) in self.affine.iter_mut().zip(stages.references.windows(2)) {
@@ -181,6 +207,14 @@ impl Planner {
 
     /// Ends the optimisation with this report.
     pub(super) fn end(&self, memory: &mut Memory, report: &mpc::OptimiserReport) {
+        memory.tracked = self.tracked;
         memory.report.record(report, self.optimiser.is_exhausted(), self.clock);
     }
+}
+
+/// Returns the largest |β| of a reference that a plan can reach, rad: that of the guarantee less
+/// every deviation.
+fn reachable_sideslip(settings: &Settings, design: &Design) -> f64 {
+    let deviation = design.tightening.forever().angle + design.tightening.tick(usize::MAX).bulge;
+    (settings.sideslip_domain * (1.0 - SIDESLIP_MARGIN) - deviation).max(0.0)
 }

@@ -17,6 +17,7 @@ use crate::mpc::OptimiserReport;
 use crate::report::SolverStatus;
 use nalgebra::{Vector3, Vector6};
 use vehicle::kinematics;
+use vehicle::reference::Reference;
 
 /// Shares of the tightening that are tried if no plan is certified.
 const LESS: [f64; 2] = [0.5, 0.0];
@@ -171,8 +172,8 @@ impl Robust {
     /// Finds a plan that satisfies the conditions of the theorem. The first choice is the optimum
     /// from the measured state, the second the optimum from the state that the previous plan
     /// predicted. The last is the previous plan itself, which satisfies the conditions if it did
-    /// before and the vehicle is no further from it than the assumptions explain. Without such a
-    /// plan the limits are violated as little as possible.
+    /// before and the vehicle is no further from it than the assumptions explain, or, without one, a
+    /// plan that brakes. Without such a plan the limits are violated as little as possible.
     fn plan(
         &mut self,
         planner: &mut Planner,
@@ -195,7 +196,7 @@ impl Robust {
                 return OptimiserReport { iterations, ..report };
             }
         }
-        if assured {
+        if memory.assured() {
             self.go_towards_the_optimum(planner, memory);
             self.terms = memory.plan.terms;
             return self.keep(planner, memory, (SolverStatus::Kept, iterations));
@@ -219,7 +220,7 @@ impl Robust {
             return report;
         }
         let certified = self.certify(planner.optimiser.trajectory(), report.settled);
-        if certified.is_none() && memory.assured() {
+        if certified.is_none() && (memory.assured() || self.brakes(planner, memory)) {
             return OptimiserReport { status: SolverStatus::Fallback, ..report };
         }
         planner.follow_optimum(&self.stages, memory, state);
@@ -241,6 +242,26 @@ impl Robust {
             memory.guarantee = GuaranteeStatus::Pending;
             memory.pending = self.design.delay_ticks;
         }
+    }
+
+    /// Begins a guarantee by a plan that brakes from the measured state, if that is certified where
+    /// the optimum is not. Returns whether it is.
+    fn brakes(&self, planner: &mut Planner, memory: &mut Memory) -> bool {
+        let Self { settings, design, stages, .. } = self;
+        let left = design.assessment.moment_left.max(0.0);
+        let settings = Settings { limit_moment: left * settings.limit_moment, ..*settings };
+        let law = |state: &Vector6<f64>, _: &_| {
+            let here = Reference { angles: split(state).0, ..Reference::default() };
+            terminal::acceleration_within_limits(&settings, state, &here)
+        };
+        memory.plan.roll_out(planner.measured, stages, law);
+        memory.plan.errors(&stages.references, &mut planner.previous);
+        (memory.age, memory.plan.shift) = (0, Vector3::zeros());
+        let certified = self.certify(&planner.previous, false);
+        if certified.is_some() {
+            self.take_over(planner, memory, certified);
+        }
+        certified.is_some()
     }
 
     /// Moves the certified plan towards the optimum without constraints as far as that is
