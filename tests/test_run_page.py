@@ -199,6 +199,20 @@ def test_two_runs_side_by_side(runs, opened):
     assert page.locator("#parameter-table tbody tr:visible").count() > 3
 
 
+def test_the_address_holds_time_and_window(runs, opened):
+    path = runs / "lqr" / "page.html"
+    page = opened(path)
+    page.wait_for_function("location.hash.includes('t=')")
+    page.evaluate("location.hash = 'window=10,20&t=12.5'; location.reload()")
+    page.wait_for_function("document.getElementById('time')?.textContent === '12.50 s'")
+    marks = page.locator(".panel svg[role=img]").nth(0).locator("text[text-anchor=middle]").all_text_contents()
+    assert (marks[0], marks[-1]) == ("10", "20 s")
+    page.fill("#seek", "15")
+    page.wait_for_function("location.hash.includes('t=15')")
+    page.locator(".panel svg[role=img]").nth(0).dblclick()
+    page.wait_for_function("!location.hash.includes('window')")
+
+
 def test_a_loss_and_a_peak_of_one_tick_are_seen_in_any_run(runs, tmp_path, opened):
     """Planted anywhere into a run of 5,001 rows: the words, the strip, the vehicle, and the curves show them."""
     long = tmp_path / "long"

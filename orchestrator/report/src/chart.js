@@ -62,20 +62,26 @@ class Chart {
   listen(onPoint, onZoom) {
     const { svg } = this;
     let begin = null;
+    // Two fingers choose the times between them, as a mouse does that is dragged.
+    const fingers = new Map();
     svg.addEventListener("pointerdown", (event) => {
       begin = event.pointerType === "mouse" && event.button === 0 ? event.clientX : null;
+      if (event.pointerType === "touch") fingers.set(event.pointerId, event.clientX);
       svg.setPointerCapture(event.pointerId);
       onPoint(this.timeAt(event.clientX));
     });
     svg.addEventListener("pointermove", (event) => {
       const isMouse = event.pointerType === "mouse";
-      if (begin !== null && Math.abs(event.clientX - begin) > 5) this.choose(begin, event.clientX);
+      if (fingers.has(event.pointerId)) fingers.set(event.pointerId, event.clientX);
+      if (fingers.size === 2) this.choose(...fingers.values());
+      else if (begin !== null && Math.abs(event.clientX - begin) > 5) this.choose(begin, event.clientX);
       else if (isMouse || event.buttons) onPoint(this.timeAt(event.clientX));
     });
     for (const end of ["pointerup", "pointercancel"]) {
       svg.addEventListener(end, (event) => {
         const chosen = this.chosen;
         begin = this.chosen = null;
+        fingers.clear();
         this.box?.remove();
         if (chosen && event.type === "pointerup") onZoom(chosen);
       });

@@ -135,7 +135,7 @@ fn guarantee() -> Markup {
             p.note {
                 "At each optimisation the law plans (thin line) and knows how far it can be pushed off \
                  its plan (blue tube). It accepts a plan only if the whole tube stays under the limit, \
-                 that is, if the plan stays under its bound (black line). Flown: thick." span id="ghost" {}
+                 that is, if the plan stays under its bound (edge of the grey area). Flown: thick." span id="ghost" {}
             }
             canvas id="plan" role="img" aria-label="Norms of body rates and moment as they were flown and planned at the chosen time, with tube, bound and limit" {}
         }

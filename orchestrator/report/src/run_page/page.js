@@ -7,9 +7,17 @@
   const ends = data.runs.flatMap((run) => [run.time[0], run.time.at(-1)]).filter((time) => time !== undefined);
   const [start, stop] = ends.length ? [Math.min(...ends), Math.max(...ends)] : [0, 1];
 
-  const player = new Player((time) => { for (const part of parts) part.point(time); });
-  const pointed = (asked) => { if (!player.isPlaying) player.seek(asked); };
-  const zoomed = (window) => { for (const chart of charts) chart.zoom(window); };
+  // Time and window stand in the address, so that it shows others the same place.
+  const asked = new URLSearchParams(location.hash.slice(1));
+  const keep = (key, value) => {
+    if (value === null) asked.delete(key); else asked.set(key, value);
+    clearTimeout(keep.waiting);
+    keep.waiting = setTimeout(() => history.replaceState(null, "", `#${asked}`), 300);
+  };
+  const short = (time) => Number(time.toPrecision(7));
+  const player = new Player((time) => { keep("t", short(time)); for (const part of parts) part.point(time); });
+  const pointed = (time) => { if (!player.isPlaying) player.seek(time); };
+  const zoomed = (window) => { keep("window", window?.map(short) ?? null); for (const chart of charts) chart.zoom(window); };
   const charts = data.panels.map(() => new Chart(find("curves"), { onPoint: pointed, onZoom: zoomed }));
   charts.forEach((chart, place) => chart.show(data.panels[place], data.runs, [start, stop]));
   const parts = [...charts];
@@ -42,5 +50,8 @@
   filter();
   player.range(start, stop);
   player.pace(stop - start);
-  player.seek(start);
+  const at = (key) => (asked.get(key) ?? "").split(",").filter(Boolean).map(Number);
+  const [[from, to], [time = start]] = [at("window"), at("t")];
+  if (from < to) zoomed([from, to]);
+  player.seek(Number.isFinite(time) ? time : start);
 })();
