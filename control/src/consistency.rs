@@ -13,6 +13,10 @@ use vehicle::kinematics;
 /// Tolerance for rounding, relative, and in rad or rad/s.
 const ROUNDING: f64 = 1e-9;
 const LEAST: f64 = 1e-12;
+/// Number of ticks in a row with the measurement of the tick before that contradict a motion, and
+/// rates (rad/s) above which there is one.
+const REPEATED: u32 = 2;
+const AT_REST: f64 = 1e-5;
 
 /// Largest excess of the sum of steps, over any window that ends at present, beyond what is allowed
 /// in it.
@@ -40,16 +44,19 @@ impl Excess {
     }
 }
 
-/// The last measurement, and the excess of the angles' changes beyond those by the rates.
+/// The last measurement, how often it has repeated, and the excess of the angles' changes beyond
+/// those by the rates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Consistency {
     last: Option<[Vector3<f64>; 2]>,
+    repeated: u32,
     excess: Excess,
 }
 
 impl Consistency {
     /// Takes the measurement of a tick, one `period` (s) after the last. Returns whether its angles
-    /// have moved as the rates say, as far as a law's assumptions explain a difference.
+    /// have moved as the rates say, as far as a law's assumptions explain a difference, and whether
+    /// its numbers are not the same again while the vehicle moves.
     pub(crate) fn observe(
         &mut self,
         explained: &Explained,
@@ -67,6 +74,9 @@ impl Consistency {
         let step = measured.angles - angles - (before + rates) * (0.5 * period);
         let [at_rest, by_rates] = explained.motion;
         let allowed = at_rest + by_rates * before.norm().max(rates.norm());
-        self.excess.add(&step, &Vector3::repeat(allowed), explained.angle)
+        let is_same = measured.angles == angles && (rates - before).amax() <= LEAST;
+        self.repeated = if is_same { self.repeated.saturating_add(1) } else { 0 };
+        let is_alive = self.repeated < REPEATED || rates.amax() <= AT_REST;
+        self.excess.add(&step, &Vector3::repeat(allowed), explained.angle) && is_alive
     }
 }

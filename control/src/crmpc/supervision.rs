@@ -113,3 +113,27 @@ impl Supervision {
         self.ended = self.ended.saturating_add(u32::from(was_assured && !self.status.is_assured()));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Contradiction, GuaranteeStatus, Supervision};
+
+    #[test]
+    fn trust_returns_a_second_after_the_last_contradiction() {
+        let mut supervision = Supervision::default();
+        let mut judge = |contradiction| {
+            supervision.judge(GuaranteeStatus::InForce, contradiction, 0.04);
+            supervision.status
+        };
+        assert_eq!(judge(Contradiction::None), GuaranteeStatus::InForce);
+        for _ in 0..3 {
+            assert_eq!(judge(Contradiction::Motion), GuaranteeStatus::Exceeded);
+        }
+        for _ in 1..25 {
+            assert_eq!(judge(Contradiction::None), GuaranteeStatus::Exceeded);
+        }
+        assert_eq!(judge(Contradiction::None), GuaranteeStatus::InForce);
+        assert_eq!(judge(Contradiction::Step), GuaranteeStatus::Stale);
+        assert_eq!(supervision.ended, 2);
+    }
+}

@@ -2,7 +2,7 @@
 
 use super::{assert_digits, gain, settings};
 use control::DesignError;
-use control::crmpc::{Design, Published, Settings, step_response_peak};
+use control::crmpc::{Constraints, Design, Published, Settings, step_response_peak};
 use control::error_dynamics::{Gain, Reach, SampledError, response};
 use nalgebra::Vector2;
 use proptest::prelude::*;
@@ -126,4 +126,37 @@ proptest! {
         simulation.advance(&[disturbance; 7]);
         prop_assert!((ours - simulation.deviation).norm() < 1e-12);
     }
+}
+
+/// Returns settings in which every bound counts.
+fn with_every_bound() -> Settings {
+    let degree = f64::to_radians(1.0);
+    Settings {
+        delay: 0.06,
+        disturbance_bound: 0.4 * degree,
+        angle_error: 0.05 * degree,
+        rate_error: 0.05 * degree,
+        slow_angle_error: 0.2 * degree,
+        slow_angle_rate: 0.03 * degree,
+        tensor_error: 0.03,
+        known_bound: 1e4,
+        known_change: 1e3,
+        ..Settings::new(Constraints::Robust)
+    }
+    .resolved()
+    .unwrap()
+}
+
+#[test]
+fn regress_every_constant_of_the_proof_has_its_part_in_the_tightening() {
+    let settings = with_every_bound();
+    let design = Design::new(&settings).unwrap();
+    let at = [0, 1, 2, 5, 50].map(|tick| *design.tightening.at(tick));
+    let (explained, left) = (design.tightening.explained, design.assessment);
+    let shown =
+        format!("{at:#.12?}\n{explained:#.12?}\n{left:#.12?}\n{:.6}", design.turn_time(&settings));
+    if shown != include_str!("tightening.txt").trim_end() {
+        println!("{shown}");
+    }
+    assert_eq!(shown, include_str!("tightening.txt").trim_end());
 }
