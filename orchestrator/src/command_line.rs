@@ -19,7 +19,7 @@ use std::path::PathBuf;
 /// Experiments and FMUs are also looked for beside the program and in the folders of the
 /// environment variable ORCHESTRATOR_PATH.
 #[derive(Parser)]
-#[command(version, name = "orchestrator", max_term_width = 100)]
+#[command(version, name = "orchestrator", max_term_width = 80)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) command: Command,

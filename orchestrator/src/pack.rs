@@ -48,6 +48,10 @@ pub(crate) fn pack(
     }
     let (system, _entries) = system(&path, overrides, fmu_dirs)?;
     ssp::pack(&system, &archive, interrupt)?;
+    let lost = ssp::lost(&system).join(", ");
+    if !lost.is_empty() {
+        tracing::warn!("SSP has no place for these settings, which the archive lacks: {lost}");
+    }
     Ok(packed(&system, &archive, out)?)
 }
 

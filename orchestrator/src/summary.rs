@@ -96,6 +96,13 @@ pub(crate) fn summary(system: &System, report: &RunReport, out: &mut impl Write)
     if let Some(end) = &report.end {
         line("ended", end.clone())?;
     }
+    let Metrics { completed, .. } = *metrics;
+    if let Some(goal) = &experiment.observe.goal
+        && completed
+        && experiment.given.stop.is_none()
+    {
+        line("goal", format!("{} reached", goal.what))?;
+    }
     if let Some(ended) = &report.ended {
         let label = if matches!(ended, Error::Lost { .. }) { "failed" } else { "ended early" };
         line(label, ended.to_string())?;
@@ -167,7 +174,11 @@ fn guarantee(metrics: &Metrics) -> Option<SummaryLine> {
         None => format!("in force throughout{margins}"),
     };
     let broken = number("broken") == Some(1.0);
-    let defect = if broken { "; DEFECT: a limit was EXCEEDED while it was in force" } else { "" };
+    let defect = if broken {
+        "; DEFECT, or an assumption that it cannot see does not hold: a limit was EXCEEDED while it was in force"
+    } else {
+        ""
+    };
     let is_within = broken.then_some(false);
     Some(SummaryLine {
         heading: "guarantee".into(),
@@ -268,7 +279,7 @@ mod tests {
         assert_eq!(
             told(&broken),
             "in force throughout, margins 1.2 % (moment), 3.1 % (rate); \
-             DEFECT: a limit was EXCEEDED while it was in force"
+             DEFECT, or an assumption that it cannot see does not hold: a limit was EXCEEDED while it was in force"
         );
         let intact = [("share", number(0.972)), ("broken", Value::Flag(false))];
         assert_eq!(

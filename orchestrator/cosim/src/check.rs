@@ -17,7 +17,6 @@ use fmu_import::faults;
 use fmu_import::fmu::Fmu;
 use fmu_import::isolation;
 use fmu_import::lookup_table::is_lookup_table;
-use fmu_import::warnings;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -127,7 +126,7 @@ fn warn_of_different_files(components: &[CheckedComponent]) {
                 file => format!("\"{component}\" reads {file}"),
             });
             let read = read.collect::<Vec<_>>().join(", ");
-            warnings::warn_once(format!("{parameter} differs from component to component: {read}"));
+            tracing::warn!("{parameter} differs from component to component: {read}");
         }
     }
 }
@@ -137,9 +136,7 @@ fn is_closed(experiment: &Experiment, foreign: Option<&Path>) -> bool {
     match (experiment.isolation.isolate, foreign) {
         (None, Some(path)) if !isolation::can_close() => {
             let path = path.display();
-            warnings::warn_once(format!(
-                "{path} runs with your rights: no process can be closed here"
-            ));
+            tracing::warn!("{path} runs with your rights: no process can be closed here");
             false
         }
         (isolate, _) => isolate.unwrap_or(foreign.is_some()),
@@ -152,11 +149,11 @@ fn warn_of_tools(components: &[CheckedComponent]) {
         let Fmu { description, .. } = &**fmu;
         let interfaces = [&description.co_simulation, &description.model_exchange];
         if interfaces.into_iter().flatten().any(|one| one.has("needsExecutionTool")) {
-            warnings::warn_once(format!(
+            tracing::warn!(
                 "{}: a closed process does not reach the program that this FMU needs: if you \
                  trust the FMU, use --isolate=false, which runs it with your rights",
                 fmu.path.display()
-            ));
+            );
         }
     }
 }
@@ -165,7 +162,7 @@ fn warn_of_tools(components: &[CheckedComponent]) {
 fn warn_of_idle_keys(experiment: &Experiment, is_closed: bool) {
     let Experiment { isolation, simulation, source, .. } = experiment;
     let warn = |keys: &str, why: &str| {
-        warnings::warn_once(format!("{}: {keys} has no effect {why}", source.path.display()));
+        tracing::warn!("{}: {keys} has no effect {why}", source.path.display());
     };
     for key in isolation.limits().filter(|_| !is_closed) {
         let why = "where the process is not closed: it is used with isolate = true";
@@ -188,7 +185,7 @@ fn open(path: &Path) -> Result<Fmu, Error> {
             1 => String::new(),
             count => format!(" ({} more, which orchestrator inspect --check lists)", count - 1),
         };
-        warnings::warn_once(format!("{}: {first}{more}", path.display()));
+        tracing::warn!("{}: {first}{more}", path.display());
     }
     Ok(fmu)
 }
@@ -239,9 +236,9 @@ fn check_size(experiment: &Experiment, clock: &Clock, columns: usize) -> Result<
         return Err(experiment.time_error(&message));
     }
     if gigabytes > 10.0 {
-        warnings::warn_once(format!(
+        tracing::warn!(
             "results.csv will take about {gigabytes:.0} GB: with [record] every = n only every n-th communication point is written"
-        ));
+        );
     }
     Ok(())
 }

@@ -4,7 +4,6 @@ use crate::error::Error;
 use crate::experiment::Experiment;
 use fmi_master::settings::Setting;
 use fmi_master::wiring::{Part, Wire};
-use fmu_import::warnings::warn_once;
 use toml::Value;
 
 /// Resolves the settings of a component.
@@ -43,12 +42,12 @@ pub(crate) fn resolve(
     }
     // A law in another program has none of the parameters of its controller.
     if !left_out.is_empty() && !experiment.is_flown_by_law(part.name) {
-        warn_once(format!(
+        tracing::warn!(
             "{} as \"{}\" does not have these parameters, which are left out: {}",
             part.description.model_name,
             part.name,
             left_out.join(", ")
-        ));
+        );
     }
     Ok(settings)
 }

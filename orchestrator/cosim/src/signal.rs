@@ -219,6 +219,14 @@ impl Resolved {
         }
     }
 
+    /// Returns by how much the first variable of a difference has moved between the values of two
+    /// samples, in the signal's unit; `None` if the signal is no difference.
+    pub fn moved(&self, before: &[f64], values: &[f64]) -> Option<f64> {
+        let [Term { value, with: Some((relation, _)) }] = self.terms[..] else { return None };
+        let moved = relation.combine(values[value], before[value], self.whole_turn);
+        (!self.norm && self.over.is_none()).then_some(self.factor * moved)
+    }
+
     /// Computes the value of the signal in a sample, in the signal's unit.
     pub fn value(&self, values: &[f64]) -> f64 {
         let term = |term: &Term<usize>| match term.with {

@@ -8,7 +8,6 @@ use fmi_master::description::Carrier;
 use fmi_master::names;
 use fmi_master::quantity::Scaling;
 use fmi_master::wiring::{Fault, Part, Port, Wire, Written, connect, port};
-use fmu_import::warnings::warn_once;
 use std::collections::{BTreeSet, HashSet};
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -99,11 +98,11 @@ pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>
             wires.push(wire);
         }
         if connection.convert_units && !converts {
-            warn_once(format!(
+            tracing::warn!(
                 "{}: convert_units has no effect on the connection to \"{}\", whose units are equal",
                 experiment.source.path.display(),
                 to.written.text
-            ));
+            );
         }
     }
     if !experiment.leaves_inputs_open {
@@ -132,7 +131,12 @@ fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) ->
         for pattern in &component.unconnected {
             let text = pattern.get_ref();
             let refuse = |message| Err(experiment.source.error(&pattern.span(), message));
-            let mut meant = inputs.iter().filter(|(_, name)| names::matches(text, name)).peekable();
+            let elements = part.description.elements(text);
+            let is_meant = |position: &usize, name: &str| {
+                names::matches(text, name) || elements.contains(position)
+            };
+            let meant = inputs.iter().filter(|(position, name)| is_meant(position, name));
+            let mut meant = meant.peekable();
             // The pattern "*" may match no input at all.
             if meant.peek().is_none() && text != "*" && !component.is_exchanged {
                 let hint = names::hint(text, inputs.iter().map(|(_, name)| *name));
@@ -150,18 +154,18 @@ fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) ->
             !connected.contains(position)
                 && !part.description.variables[*position].is_optional
                 && !component.parameters.contains_key(*name)
-                && !component
-                    .unconnected
-                    .iter()
-                    .any(|pattern| names::matches(pattern.get_ref(), name))
+                && !component.unconnected.iter().any(|pattern| {
+                    let text = pattern.get_ref();
+                    names::matches(text, name) || part.description.elements(text).contains(position)
+                })
         };
         let open: Vec<&str> = inputs.iter().filter(open).map(|(_, name)| *name).collect();
         if component.is_exchanged && !open.is_empty() {
-            warn_once(format!(
+            tracing::warn!(
                 "inputs of \"{}\" stay at their start value: {}",
                 part.name,
                 open.join(", ")
-            ));
+            );
             continue;
         }
         if !open.is_empty() {
@@ -229,10 +233,10 @@ pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Col
         }
     }
     if !missing.is_empty() {
-        warn_once(format!(
+        tracing::warn!(
             "these variables are not recorded, because the exchanged FMUs do not have them: {}",
             missing.join(", ")
-        ));
+        );
     }
     Ok(columns)
 }

@@ -2,9 +2,9 @@
 
 use crate::error::Error;
 use crate::folder::TemporaryFolder;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fs::{self, File};
-use std::io::{self, Read};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 use zip::ZipArchive;
 
@@ -24,7 +24,7 @@ const LONGEST_NAME_SHOWN: usize = 200;
 ///
 /// # Errors
 /// Returns an error if the file is not an archive, or if the archive has absolute paths, paths that
-/// lead out of the folder, duplicate names, links, encrypted entries, or more content or folders
+/// lead out of the folder, other contents of one name, links, encrypted entries, or more content or folders
 /// than any FMU has.
 pub fn unpack(path: &Path) -> Result<TemporaryFolder, Error> {
     unpack_limited(path, SIZE_LIMIT, ENTRY_LIMIT, str::to_string)
@@ -54,6 +54,16 @@ fn unpack_limited(
     let file = File::open(path).map_err(|source| refuse(format!("cannot be opened: {source}")))?;
     let mut archive = ZipArchive::new(file)
         .map_err(|source| refuse(format!("is not a zip archive: {source}")))?;
+    if archive.has_duplicate_names() {
+        let name =
+            contradiction(path, archive.central_directory_start()).map_err(Error::file(path))?;
+        if let Some(name) = name {
+            let name = shown(&name);
+            return Err(refuse(format!(
+                "refused: two entries of the archive are called \"{name}\" and have other contents"
+            )));
+        }
+    }
     let names = names(&mut archive, entry_limit, normalized).map_err(refuse)?;
 
     let folder = TemporaryFolder::new().map_err(Error::file(std::env::temp_dir()))?;
@@ -86,15 +96,36 @@ fn unpack_limited(
     Ok(folder)
 }
 
+/// Returns the name of entries with other contents, by their checksums and sizes in the directory of
+/// the archive, which begins at this place of the file.
+fn contradiction(path: &Path, place: u64) -> io::Result<Option<String>> {
+    /// Length of the fixed part of an entry of the directory, which begins with these bytes.
+    const FIXED: usize = 46;
+    const BEGIN: &[u8] = b"PK\x01\x02";
+    let mut file = File::open(path)?;
+    file.seek(SeekFrom::Start(place))?;
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes)?;
+    let (mut contents, mut rest) = (HashMap::new(), bytes.as_slice());
+    while rest.starts_with(BEGIN) && rest.len() >= FIXED {
+        let length = |at: usize| usize::from(u16::from_le_bytes([rest[at], rest[at + 1]]));
+        let (name, others) = (length(28), length(30) + length(32));
+        let Some(entry) = rest.get(..FIXED + name + others) else { break };
+        let (name, content) = (&entry[FIXED..FIXED + name], &entry[16..28]);
+        if *contents.entry(name).or_insert(content) != content {
+            return Ok(Some(String::from_utf8_lossy(name).into_owned()));
+        }
+        rest = &rest[entry.len()..];
+    }
+    Ok(None)
+}
+
 /// Returns the names of the entries, or the reason why nothing of the archive is written.
 fn names(
     archive: &mut ZipArchive<File>,
     limit: usize,
     normalized: fn(&str) -> String,
 ) -> Result<Vec<String>, String> {
-    if archive.has_duplicate_names() {
-        return Err("refused: two entries of the archive have the same name".into());
-    }
     let count = archive.len();
     if count > limit {
         return Err(format!("refused: it has {count} entries, at most {limit} are allowed"));
@@ -257,19 +288,25 @@ mod tests {
     }
 
     #[test]
-    fn duplicate_names_are_refused() {
+    fn duplicate_names_are_refused_unless_their_contents_are_the_same() {
         // The writer refuses to make such an archive, so rename an entry of a good one in place.
-        let file = archive(&[("aaaa", b"1"), ("bbbb", b"2")]);
-        let bytes = fs::read(file.path()).unwrap();
-        let mut renamed = bytes.clone();
-        for start in 0..bytes.len() - 4 {
-            if &bytes[start..start + 4] == b"bbbb" {
-                renamed[start..start + 4].copy_from_slice(b"aaaa");
+        let doubled = |second: &[u8]| {
+            let file = archive(&[("aaaa", b"1"), ("bbbb", second)]);
+            let bytes = fs::read(file.path()).unwrap();
+            let mut renamed = bytes.clone();
+            for start in 0..bytes.len() - 4 {
+                if &bytes[start..start + 4] == b"bbbb" {
+                    renamed[start..start + 4].copy_from_slice(b"aaaa");
+                }
             }
-        }
-        assert_ne!(bytes, renamed);
-        fs::write(file.path(), renamed).unwrap();
-        assert!(refusal(&file).contains("same name"));
+            assert_ne!(bytes, renamed);
+            fs::write(file.path(), renamed).unwrap();
+            file
+        };
+        let message = refusal(&doubled(b"2"));
+        assert!(message.contains("two entries of the archive are called \"aaaa\""), "{message}");
+        let folder = unpack(doubled(b"1").path()).unwrap();
+        assert_eq!(fs::read(folder.path().join("aaaa")).unwrap(), b"1");
     }
 
     #[test]

@@ -12,7 +12,6 @@ use crate::law::{LawInstance, Ports};
 use crate::loading::{self, Kind, Made, Refusal};
 use crate::log::Log;
 use crate::lookup_table::{self, LookupTable, LookupTableInstance};
-use crate::warnings;
 use fmi_master::description::{InterfaceKind, ModelDescription};
 use fmi_master::instance::Instance;
 use fmi_rs::SHARED_LIBRARY_EXTENSION;
@@ -218,7 +217,7 @@ impl Fmu {
             .made(archive, (name, &of_component), kind)
             .map_err(|message| Error::Fmu { path: self.path.clone(), message })?;
         if let Some(fault) = fault {
-            warnings::warn_once(format!("{}: {fault}", self.path.display()));
+            tracing::warn!("{}: {fault}", self.path.display());
         }
         Ok(instance)
     }

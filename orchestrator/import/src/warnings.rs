@@ -61,6 +61,16 @@ pub fn at(time: f64) {
     });
 }
 
+/// Returns whether a line of the log is a warning that was printed before, by any thread or closed
+/// process.
+pub(crate) fn is_repeated(line: &str) -> bool {
+    static PRINTED: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    let mut printed = PRINTED.lock();
+    // Colours may come first.
+    let is_warning = line.find("WARN").is_some_and(|place| place < 12);
+    is_warning && !printed.insert(line.to_string())
+}
+
 /// Records or prints a warning of an instance.
 pub fn warn(text: &str) {
     if !collected(text) {
@@ -82,16 +92,6 @@ pub(crate) fn collected(text: &str) -> bool {
         }
         true
     })
-}
-
-/// Prints a warning about a file once, however many threads open the file and however often.
-pub fn warn_once(text: String) {
-    static PRINTED: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
-    let mut printed = PRINTED.lock();
-    if !printed.contains(&text) {
-        tracing::warn!("{text}");
-        printed.insert(text);
-    }
 }
 
 impl Warning {

@@ -178,7 +178,14 @@ struct Loss {
     ends_run: bool,
     /// First time at which the bound was exceeded, s.
     at: Option<f64>,
+    /// Values of the last sample.
+    before: Vec<f64>,
+    /// How far what is controlled has moved away from its reference, in the unit of the signals.
+    away: f64,
 }
+
+/// Part of the bound by which a motion must have led away from the reference for a loss.
+const MOTION: f64 = 0.5;
 
 impl Loss {
     /// Creates the bound of a section of the experiment; `None` if it has none, or if an FMU that
@@ -205,15 +212,45 @@ impl Loss {
         let signals: Vec<_> = signals.collect::<Result<_, _>>().map_err(fault)?;
         common_unit(&signals).map_err(fault)?;
         let what = format!("{what} {verb}");
-        Ok(Some(Self { what, list, section, signals, beyond, ends_run: false, at: None }))
+        let (ends_run, at, before, away) = (false, None, Vec::new(), 0.0);
+        Ok(Some(Self { what, list, section, signals, beyond, ends_run, at, before, away }))
+    }
+
+    fn reset(&mut self) {
+        (self.at, self.away) = (None, 0.0);
+        self.before.clear();
+    }
+
+    /// Returns the norm of the signals in a sample.
+    fn norm(&self, sample: &Sample) -> f64 {
+        let squares = self.signals.iter().map(|signal| signal.value(sample.values).powi(2));
+        squares.sum::<f64>().sqrt()
+    }
+
+    /// Notes the first time at which something is lost: the bound is exceeded, and not only because
+    /// a command, or the start, is far. Of differences, the first variables must have moved away.
+    fn observe_motion(&mut self, sample: &Sample) -> Result<(), Error> {
+        let (norm, values) = (self.norm(sample), sample.values);
+        let differs = self.signals.iter().all(|signal| signal.moved(values, values).is_some());
+        if differs && !self.before.is_empty() && norm > 0.0 {
+            let moved = self.signals.iter().map(|signal| {
+                signal.moved(&self.before, values).unwrap_or(0.0) * signal.value(values)
+            });
+            self.away = (self.away + moved.sum::<f64>() / norm).max(0.0);
+        }
+        self.before.clear();
+        self.before.extend_from_slice(values);
+        // What is not a number is lost as well.
+        if differs && self.away < MOTION * self.beyond && !norm.is_nan() {
+            return Ok(());
+        }
+        self.observe(sample)
     }
 
     /// Notes the first time at which the bound is exceeded.
     fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
-        let squares = self.signals.iter().map(|signal| signal.value(sample.values).powi(2));
-        let norm = squares.sum::<f64>().sqrt();
         // A norm that is not a number also exceeds it.
-        if self.at.is_some() || norm <= self.beyond {
+        if self.at.is_some() || self.norm(sample) <= self.beyond {
             return Ok(());
         }
         self.at = Some(sample.time);
@@ -282,7 +319,7 @@ impl Meters {
             record.reset();
         }
         for bound in self.loss.iter_mut().chain(&mut self.goal) {
-            bound.at = None;
+            bound.reset();
         }
         (self.samples, self.completed) = (0, false);
     }
@@ -368,7 +405,7 @@ impl Observer for Meters {
             self.completed &= goal.at.is_none();
             outcome?;
         }
-        self.loss.as_mut().map_or(Ok(()), |loss| loss.observe(sample))
+        self.loss.as_mut().map_or(Ok(()), |loss| loss.observe_motion(sample))
     }
 }
 

@@ -63,7 +63,7 @@ impl Progress {
         if !stderr().is_terminal() && !quiet {
             tell(format_args!("running {title}: {ticks} steps"));
         }
-        let bar = bar(ticks, quiet, "{msg} [{bar:40}] {percent} %, {left}");
+        let bar = bar(ticks, quiet, "[{bar:30}] {percent} %, {left} {wide_msg}");
         bar.set_message(title.to_string());
         if apart {
             bar.enable_steady_tick(Duration::from_millis(100));
@@ -111,7 +111,8 @@ impl Parts {
         if !stderr().is_terminal() && !quiet {
             tell(format_args!("{title}: {} of {total} {what} to run", total - done));
         }
-        let template = format!("[{{bar:40}}] {{pos}} of {{len}} {what}, {{rate}}, {{left}}{{msg}}");
+        let template =
+            format!("[{{bar:20}}] {{pos}} of {{len}} {what}, {{rate}}, {{left}}{{wide_msg}}");
         let bar = bar(total, quiet, &template);
         bar.set_position(done);
         bar.reset_eta();

@@ -5,8 +5,10 @@ from __future__ import annotations
 import html
 import json
 import os
+import sys
+import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 STATUS = ["completed", "ended", "lost", "failed"]
+PAUSE = 10.0
+"""Time from one message of the progress to the next, s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,11 +170,12 @@ class Campaign:
             """
         check_units(units)
         folder = Path("out", self.name) if out is None else Path(out)
-        if self.law is not None:
-            self._fly(self.law, folder, jobs)
-        else:
-            threads = [] if jobs is None else ["--jobs", str(jobs)]
-            self.call("--out", str(folder), *threads)
+        with self._progress(folder):
+            if self.law is not None:
+                self._fly(self.law, folder, jobs)
+            else:
+                threads = [] if jobs is None else ["--jobs", str(jobs)]
+                self.call("--out", str(folder), *threads)
         return Flown(
             table=read_cases(folder / "cases.parquet", units),
             summary=json.loads((folder / "summary.json").read_text("utf-8")),
@@ -244,6 +249,30 @@ class Campaign:
                 flown.update(first for first, _ in missing)
                 pool.fly(missing)
             pool.finish()
+
+    @contextmanager
+    def _progress(self, folder: Path) -> Iterator[None]:
+        """Tells on standard error from time to time how many cases are left."""
+        done = threading.Event()
+
+        def tell() -> None:
+            while not done.wait(PAUSE):
+                with suppress(Exception):
+                    left = sum(last - first for first, last in missing_parts(self._quietly, folder))
+                    print(f"{self.name}: {left} cases to be flown", file=sys.stderr, flush=True)
+
+        thread = threading.Thread(target=tell, daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            done.set()
+            thread.join()
+
+    def _quietly(self, *arguments: str) -> str:
+        """Calls the orchestrator with this campaign, without its warnings."""
+        with self._laws() as laws:
+            return orchestrate([*self.command(), *arguments], "error", laws)[2]
 
     def command(self) -> list[str]:
         """Returns the arguments of the orchestrator for this campaign."""

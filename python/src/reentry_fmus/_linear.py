@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,10 +16,10 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from ._data import experiment_path
+from ._data import caller, experiment_path
 from ._experiment import Value, changes
 from ._law import laws_of
-from ._orchestrator import OrchestratorError, orchestrate
+from ._orchestrator import OrchestratorError, OrchestratorWarning, orchestrate
 from ._state import Law
 
 if TYPE_CHECKING:
@@ -75,8 +76,8 @@ class OpenLoop:
 
 def linearise(
     name: str | os.PathLike[str],
-    at: float,
-    open: str | Sequence[str],
+    at: float | None = None,
+    open: str | Sequence[str] = (),
     set: Mapping[str, Value] | None = None,
     *,
     fmu: Mapping[str, str | os.PathLike[str]] | None = None,
@@ -91,8 +92,9 @@ def linearise(
 
     Args:
         name: An experiment of `experiments()`, or the path of an experiment file (TOML).
-        at: Time of the run, s.
-        open: Signals at which the loop is opened: connected inputs or outputs.
+        at: Time of the run, s, by default that of the experiment's [observe.margins].
+        open: Signals at which the loop is opened: connected inputs or outputs. By default those of
+            [observe.margins].
         set: Parameters by component.parameter.
         fmu: FMUs that replace those of components.
         step: Length of the communication step, s.
@@ -119,8 +121,8 @@ def linearise(
 
 def margins(
     name: str | os.PathLike[str],
-    at: float,
-    open: str | Sequence[str],
+    at: float | None = None,
+    open: str | Sequence[str] = (),
     set: Mapping[str, Value] | None = None,
     *,
     fmu: Mapping[str, str | os.PathLike[str]] | None = None,
@@ -135,8 +137,9 @@ def margins(
 
     Args:
         name: An experiment of `experiments()`, or the path of an experiment file (TOML).
-        at: Time of the run, s.
-        open: Signals at which the loop is opened: connected inputs or outputs.
+        at: Time of the run, s, by default that of the experiment's [observe.margins].
+        open: Signals at which the loop is opened: connected inputs or outputs. By default those of
+            [observe.margins].
         set: Parameters by component.parameter.
         fmu: FMUs that replace those of components.
         step: Length of the communication step, s.
@@ -148,8 +151,8 @@ def margins(
         One row for each signal, with the loops of the others closed, and one for all together:
         factors of the gain, phase lag (deg) and delay (s) at which the loop becomes unstable, the
         radius of the disk margin with its frequency (rad/s), and the largest magnitude of the
-        sensitivity. What has no limit is not a number. The table is empty if the loop is unstable;
-        `attrs` has "stable", "spectral_radius", "period", "note", and "sides" with the answers for
+        sensitivity. What has no limit is not a number. The table is empty if the loop is unstable,
+        with a warning; `attrs` has "stable", "spectral_radius", "period", "note", and "sides" with the answers for
         increases and decreases where the loop has no derivative.
 
     Raises:
@@ -175,13 +178,17 @@ def margins(
     )
     kept = ("stable", "spectral_radius", "period", "note", "sides")
     table.attrs.update({key: found[key] for key in kept if key in found})
+    if not found["stable"]:
+        magnitude = found["spectral_radius"]
+        text = f"there are no margins, because the loop is unstable at t = {found['time']:g} s: an eigenvalue of the closed loop has the magnitude {magnitude:.6f}"
+        warnings.warn(text, OrchestratorWarning, stacklevel=caller())
     return table
 
 
 def answer(
     more: list[str],
     name: str | os.PathLike[str],
-    at: float,
+    at: float | None,
     open: str | Sequence[str],
     set: Mapping[str, Value] | None,
     fmu: Mapping[str, str | os.PathLike[str]] | None,

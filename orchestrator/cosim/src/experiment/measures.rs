@@ -198,7 +198,9 @@ pub struct Guarantee {
     pub optional: bool,
 }
 
-/// Condition under which a run is lost and ends, or under which it has missed its goal.
+/// Condition under which a run is lost and ends, or under which it has missed its goal. Of signals
+/// that are differences, what is controlled must also have moved away from its reference by half of
+/// the bound: a command alone loses nothing.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Loss {

@@ -6,7 +6,6 @@ use crate::error::Error;
 use crate::watch::OnInvalid;
 use clap::Args;
 use fmi_master::names;
-use fmu_import::warnings::warn_once;
 use std::collections::BTreeMap;
 use std::path::Path;
 use toml::{Spanned, Value};
@@ -116,10 +115,10 @@ impl Experiment {
             name == PERIOD_OF_LAW || GROUPS_OF_LAW.contains(&group)
         };
         for (owner, name) in owned.filter(|(owner, name)| *owner == CONTROLLER && !acts(name)) {
-            warn_once(format!(
+            tracing::warn!(
                 "{owner}.{name} has no effect on the law {law}: of its controller, a law has \
                  reference, limits, inputs and period"
-            ));
+            );
         }
     }
 

@@ -10,7 +10,6 @@ use fmi_master::names;
 use fmi_master::quantity::Scaling;
 use fmi_master::wiring::Part;
 use fmu_import::description::indices;
-use fmu_import::warnings::warn_once;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use toml::{Spanned, Value};
@@ -204,11 +203,11 @@ impl<'a> Flow<'a> {
                 count => format!(" and {} more", count - LISTED),
             };
             let names = names[..names.len().min(LISTED)].join(", ");
-            warn_once(format!(
+            tracing::warn!(
                 "{}: {file}: these values are left out, because there are no such variables: \
                  {names}{more}",
                 path.display()
-            ));
+            );
         }
         Ok(())
     }

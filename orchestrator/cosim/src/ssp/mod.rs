@@ -10,7 +10,7 @@ mod value;
 mod write;
 
 pub use read::{Entries, Loaded, load};
-pub use write::pack;
+pub use write::{lost, pack};
 
 /// Path of the system structure in an archive.
 const STRUCTURE: &str = "SystemStructure.ssd";

@@ -2,9 +2,11 @@
 
 use super::{FMU, STRUCTURE};
 use crate::error::Error;
+use crate::experiment::{Coupling, OnInvalid, Simulation};
 use crate::files;
 use crate::interrupt::Interrupt;
 use crate::system::{CheckedComponent, System};
+use fmi_master::delay;
 use fmi_master::description::{InterfaceKind, Variable, VariableKind};
 use fmi_master::quantity::{Scaling, UnitDefinition};
 use fmi_master::settings::{Setting, SettingValue};
@@ -23,9 +25,8 @@ const NAMESPACES: [(&str, &str); 3] = [
     ("xmlns:ssv", "http://ssp-standard.org/SSP1/SystemStructureParameterValues"),
 ];
 
-/// Writes an experiment as an archive. Settings for which the standard has no place, above all the
-/// step, are left out, as are values that equal the FMU's start values. The same experiment always
-/// gives the same bytes.
+/// Writes an experiment as an archive, without the settings for which the standard has no place.
+/// The same experiment always gives the same bytes.
 ///
 /// # Errors
 /// Returns an error if a file cannot be read or written, or if the work was asked to end. Nothing
@@ -58,6 +59,22 @@ pub fn pack(system: &System, path: &Path, interrupt: &Interrupt) -> Result<(), E
     let bytes = archive.finish().map_err(|error| Error::file(path)(error.into()))?.into_inner();
     goes_on()?;
     files::write(path, bytes)
+}
+
+/// Returns the names of the settings, beside the step, that an archive cannot hold.
+pub fn lost(system: &System) -> Vec<&'static str> {
+    let System { experiment, components, wires, .. } = system;
+    let Simulation { coupling, ends_with, on_invalid, .. } = &experiment.simulation;
+    let order = delay::order(&system.parts(), wires);
+    let settings = [
+        ("order", !order.into_iter().eq(0..components.len())),
+        ("coupling", *coupling != Coupling::Sequential),
+        ("every", components.iter().any(|component| component.every > 1)),
+        ("ends_with", ends_with.is_some()),
+        ("on_invalid", *on_invalid != OnInvalid::default()),
+        ("[observe]", !experiment.observe.signals.is_empty()),
+    ];
+    settings.into_iter().filter(|(_, is_lost)| *is_lost).map(|(name, _)| name).collect()
 }
 
 fn resource(fmu: &Path) -> String {
@@ -154,20 +171,9 @@ fn connector(variable: &Variable) -> Element {
     Element::new("ssd:Connector", attributes).holding(is_typed.then_some(kind))
 }
 
-/// Writes the values of a component that differ from its FMU's start values.
+/// Writes the values of a component. One that equals the start value is written as well, because
+/// setting it may have an effect of its own.
 fn bindings(component: &CheckedComponent) -> Option<Element> {
-    let description = &component.fmu.description;
-    let differs = |setting: &&Setting| {
-        let start = description.find(&setting.name).and_then(|(_, v)| v.start.as_deref());
-        match &setting.value {
-            SettingValue::Real(value) => start.and_then(|text| text.parse().ok()) != Some(*value),
-            SettingValue::Integer(value) | SettingValue::Item(_, value) => {
-                start.and_then(|text| text.parse().ok()) != Some(*value)
-            }
-            SettingValue::Boolean(value) => start != Some(if *value { "true" } else { "false" }),
-            SettingValue::Text(value) => start != Some(value),
-        }
-    };
     let parameter = |setting: &Setting| {
         let (kind, value) = match &setting.value {
             SettingValue::Real(value) => ("ssv:Real", real(*value)),
@@ -179,7 +185,7 @@ fn bindings(component: &CheckedComponent) -> Option<Element> {
         Element::new("ssv:Parameter", [("name", setting.name.clone())])
             .holding([Element::new(kind, [("value", value)])])
     };
-    let parameters = component.settings.iter().filter(differs).map(parameter);
+    let parameters = component.settings.iter().map(parameter);
     let name = identifier(&format!("{}_values", component.name));
     let set = listed("ssv:Parameters", parameters).map(|parameters| {
         Element::new("ssv:ParameterSet", [("version", "1.0".into()), ("name", name)])

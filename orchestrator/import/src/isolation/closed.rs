@@ -7,6 +7,7 @@ use super::inside::{self, Kind, Link, Pipes};
 use super::page::{Doing, Page, SLOTS};
 use super::{Closing, Ended, LastCall};
 use crate::folder::TemporaryFolder;
+use crate::warnings;
 use fmi_master::instance::CallFailure;
 use rustix::fs::{OFlags, fcntl_setfl};
 use serde::de::DeserializeOwned;
@@ -327,6 +328,9 @@ impl Closed {
 
 /// Prints a line of a log, without what could change the terminal.
 fn print(line: &str) {
+    if warnings::is_repeated(line) {
+        return;
+    }
     // Colours of the log are left out.
     let mut parts = line.split("\u{1b}[");
     let begin = parts.next().unwrap_or_default().to_string();

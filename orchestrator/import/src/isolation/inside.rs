@@ -4,7 +4,7 @@
 
 use super::Closing;
 use super::{page, sandbox};
-use crate::law;
+use crate::{law, warnings};
 use parking_lot::Mutex;
 use rustix::process::{Resource, Rlimit, Signal, setrlimit};
 use serde::Serialize;
@@ -95,7 +95,11 @@ pub struct Messages;
 
 impl Write for Messages {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if send_bytes(Kind::Log, bytes)? { Ok(bytes.len()) } else { io::stderr().write(bytes) }
+        if send_bytes(Kind::Log, bytes)? || warnings::is_repeated(&String::from_utf8_lossy(bytes)) {
+            Ok(bytes.len())
+        } else {
+            io::stderr().write(bytes)
+        }
     }
 
     fn flush(&mut self) -> io::Result<()> {

@@ -54,6 +54,9 @@ pub struct Messages;
 
 impl Write for Messages {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if crate::warnings::is_repeated(&String::from_utf8_lossy(bytes)) {
+            return Ok(bytes.len());
+        }
         io::stderr().write(bytes)
     }
 

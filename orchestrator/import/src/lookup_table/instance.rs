@@ -1,6 +1,6 @@
 //! An instance of a lookup table.
 
-use super::{HOLD, LookupTable};
+use super::{Column, Form, HOLD, LookupTable};
 use crate::warnings;
 use fmi_master::instance::{CallFailure, Instance, Outcome};
 use fmi_master::quantity::rounded;
@@ -61,6 +61,24 @@ impl LookupTableInstance {
             (1.0 - part) * table.value(last, place) + part * table.value(next, place)
         };
         table.numbers[count + 2 + place] * value
+    }
+
+    /// Returns the first column of an angle that is interpolated over more than half a turn, with
+    /// the row before it.
+    fn long_turn(&self) -> Option<(&Column, usize)> {
+        let Self { table, .. } = self;
+        let columns = table.columns.iter().enumerate();
+        let mut turns = columns.filter_map(|(place, column)| {
+            let half = match &column.form {
+                Form::Real(Some(unit)) if unit == "deg" => 180.0,
+                Form::Real(Some(unit)) if unit == "rad" => std::f64::consts::PI,
+                _ => return None,
+            };
+            let turn = |row: usize| table.value(row + 1, place) - table.value(row, place);
+            let row = (0..table.rows.saturating_sub(1)).find(|row| turn(*row).abs() > half)?;
+            Some((column, row))
+        });
+        turns.next().filter(|_| table.numbers[table.columns.len()] != HOLD)
     }
 
     fn set(&mut self, call: &'static str, reference: u32, value: f64) -> Outcome {
@@ -134,6 +152,13 @@ impl Instance for LookupTableInstance {
             ));
         }
         self.go_to(start);
+        if let Some((column, row)) = self.long_turn() {
+            let (name, [from, to]) = (&column.name, [row, row + 1].map(|row| row + 1));
+            warnings::warn(&format!(
+                "{}: {name} is interpolated the long way round between its rows {from} and {to}: add a whole turn to the later ones",
+                self.name
+            ));
+        }
         // One row is a constant.
         if let [first, .., last] = *self.table.times() {
             let [first, last] = [first, last].map(|time| rounded(time + self.shift()));

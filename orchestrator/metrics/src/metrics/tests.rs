@@ -29,6 +29,8 @@ fn meters() -> Meters {
         beyond: 5.5_f64.to_degrees(),
         ends_run: false,
         at: None,
+        before: Vec::new(),
+        away: 0.0,
     };
     Meters {
         gauges: gauges.map(|(name, gauge)| (name.to_string(), gauge)).into(),
@@ -93,6 +95,7 @@ fn a_run_is_lost_beyond_its_bound_or_where_the_signal_is_no_number() {
         assert_eq!((meters.metrics().lost_at, meters.metrics().completed), (Some(1.0), true));
     }
     let mut ending = meters().ending_when_lost();
+    ending.observe(&Sample { tick: 2, time: 0.2, last: false, values: &row(1.0) }).unwrap();
     let sample = Sample { tick: 3, time: 0.1 + 0.2, last: false, values: &row(6.0) };
     let error = ending.observe(&sample).unwrap_err();
     assert_eq!(error.exit_code(), 3);
@@ -102,6 +105,29 @@ fn a_run_is_lost_beyond_its_bound_or_where_the_signal_is_no_number() {
             .starts_with("attitude lost at t = 0.3 s: the norm of \"error\" exceeds 315.1"),
         "{error}"
     );
+}
+
+#[test]
+fn a_command_or_a_far_start_is_no_loss() {
+    let row = |alpha: f64, reference: f64| {
+        let mut row = [0.0; 8];
+        (row[0], row[3]) = (alpha, reference);
+        row
+    };
+    // It starts far, follows a far command, and falls behind one that runs away.
+    let mut followed = meters();
+    let rows = [row(7.0, 0.0), row(4.0, 0.0), row(3.0, -9.0), row(-5.0, -9.0), row(-4.9, 2.0)];
+    feed(&mut followed, &rows);
+    assert_eq!(followed.metrics().lost_at, None);
+    // It moves away from a far command, and then from one that is there.
+    for rows in [
+        [row(0.0, -9.0), row(2.0, -9.0), row(3.0, -9.0)],
+        [row(0.0, 0.0), row(2.0, 0.0), row(5.6, 0.0)],
+    ] {
+        let mut lost = meters();
+        feed(&mut lost, &rows);
+        assert_eq!(lost.metrics().lost_at, Some(2.0));
+    }
 }
 
 #[test]
