@@ -242,6 +242,13 @@ mod tests {
     }
 
     #[test]
+    fn oracle_differences_ignore_the_zero_of_a_unit() {
+        let units: Vec<_> = units().iter().map(UnitDefinition::of_differences).collect();
+        assert_eq!(convert("5 degC", Some("K"), &units), Ok(5.0));
+        assert_eq!(convert("180 deg", Some("rad"), &units), Ok(std::f64::consts::PI));
+    }
+
+    #[test]
     fn wrong_units_are_refused() {
         let units = units();
         assert!(

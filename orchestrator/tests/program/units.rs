@@ -1,7 +1,7 @@
 //! Generated SSP systems, whose values are those of the standard's arithmetic: SSP 2.0, sections 4
 //! (units, transformations) and 5 (connections).
 
-use crate::bench::{Bench, Random, Recipe};
+use crate::bench::{Bench, FMI3, Random, Recipe};
 use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
@@ -111,7 +111,7 @@ impl Archive {
     fn add_chain(&mut self, random: &mut Random, number: usize) {
         let quantity = random.below(2);
         let unit = |random: &mut Random| (random.below(3) > 0).then(|| random.below(3));
-        let mut before: Option<(String, &str, f64, Unit)> = None;
+        let mut before: Option<(String, f64, Unit)> = None;
         for place in 0..2 + random.below(3) {
             let name = format!("c{number}_{place}");
             let own = unit(random);
@@ -166,7 +166,7 @@ impl Archive {
             };
             // The value that comes in, by the units of the connectors on its way.
             let mut input = 0.0;
-            if let Some((start, _, value, unit)) = before {
+            if let Some((start, value, unit)) = before {
                 let passage = Passage::new(random);
                 let _ = write!(
                     self.connections,
@@ -189,24 +189,61 @@ impl Archive {
             if is_nested {
                 leaves = outward.apply(quantity, leaves, around_y.or(of_y));
             }
-            before = Some((name, "y", leaves.0, leaves.1));
+            before = Some((name, leaves.0, leaves.1));
         }
     }
 
-    fn write(&self, bench: &Bench, fmus: &[(String, Vec<u8>)]) {
-        let structure = format!(
-            "<SystemStructureDescription xmlns=\"d\" xmlns:c=\"c\" xmlns:v=\"v\" xmlns:m=\"m\" name=\"generated\" version=\"2.0\"><System name=\"s\"><Elements>{}</Elements><Connections>{}</Connections></System><Units>{}</Units><DefaultExperiment startTime=\"0\" stopTime=\"1\"/></SystemStructureDescription>",
-            self.elements,
-            self.connections,
-            definitions("c:")
-        );
-        let mut zip = zip::ZipWriter::new(fs::File::create(bench.path("x.ssp")).unwrap());
-        let all = fmus.iter().map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
-        for (name, bytes) in all.chain([("SystemStructure.ssd", structure.as_bytes())]) {
-            zip.start_file(name, SimpleFileOptions::default()).unwrap();
-            zip.write_all(bytes).unwrap();
-        }
-        zip.finish().unwrap();
+    fn structure(&self) -> String {
+        let units = definitions("c:");
+        let Self { elements, connections, .. } = self;
+        format!(
+            "<SystemStructureDescription xmlns=\"d\" xmlns:c=\"c\" xmlns:v=\"v\" xmlns:m=\"m\" name=\"generated\" version=\"2.0\"><System name=\"s\"><Elements>{elements}</Elements><Connections>{connections}</Connections></System><Units>{units}</Units><DefaultExperiment startTime=\"0\" stopTime=\"1\"/></SystemStructureDescription>"
+        )
+    }
+}
+
+/// Writes an archive, runs it, and returns the names and the values of the last row.
+fn last_row(bench: &Bench, structure: &str, fmus: &[(String, Vec<u8>)]) -> (Vec<String>, Vec<f64>) {
+    let mut zip = zip::ZipWriter::new(fs::File::create(bench.path("x.ssp")).unwrap());
+    let entries = fmus.iter().map(|(name, bytes)| (name.as_str(), bytes.as_slice()));
+    for (name, bytes) in entries.chain([("SystemStructure.ssd", structure.as_bytes())]) {
+        zip.start_file(name, SimpleFileOptions::default()).unwrap();
+        zip.write_all(bytes).unwrap();
+    }
+    zip.finish().unwrap();
+    bench.says(&["run", "x.ssp", "--force", "--quiet", "--step", "1"]);
+    let text = bench.text("out/x/results.csv");
+    let mut lines = text.lines().map(|line| line.split(','));
+    let names = lines.next().unwrap().map(String::from).collect();
+    let last = lines.next_back().unwrap();
+    (names, last.map(|cell| cell.parse().unwrap()).collect())
+}
+
+#[test]
+fn connections_may_be_restricted_to_elements_of_arrays() {
+    let bench = Bench::made("", &Recipe { files: FMI3, ..Recipe::default() });
+    let fmu = fs::read(bench.path("Model.fmu")).unwrap();
+    let [a, b, c] =
+        ["a", "b", "c"].map(|name| format!("<Component name=\"{name}\" source=\"Model.fmu\"/>"));
+    let crossed = [(1, 2), (2, 1)].map(|(from, to)| {
+        format!("<Connection startElement=\"a\" startConnector=\"y\" startIndices=\"{from}\" endElement=\"b\" endConnector=\"u\" endIndices=\"{to}\"/>")
+    });
+    let archive = Archive {
+        elements: format!(
+            "{a}{b}<System name=\"s\"><Connectors><Connector name=\"x\" kind=\"input\"><c:Float64 unit=\"mm\"/><Dimension size=\"2\"/></Connector></Connectors><Elements>{c}</Elements><Connections><Connection startConnector=\"x\" endElement=\"c\" endConnector=\"u\"/></Connections></System>"
+        ),
+        connections: crossed.concat()
+            + "<Connection startElement=\"b\" startConnector=\"y\" endElement=\"s\" endConnector=\"x\"><c:LinearTransformation offset=\"1\"/></Connection>",
+        ..Archive::default()
+    };
+    let (names, last) = last_row(&bench, &archive.structure(), &[("Model.fmu".into(), fmu)]);
+    let value = |name: &str| last[names.iter().position(|found| found == name).unwrap()];
+    assert_eq!([value("b.u[1]"), value("b.u[2]")], [value("a.y[2]"), value("a.y[1]")]);
+    assert_ne!(value("b.u[1]"), value("b.u[2]"));
+    // A millimetre is added at the of the system's connector.
+    for element in ["[1]", "[2]"] {
+        let expected = value(&format!("b.y{element}")) + 1e-3;
+        assert!((value(&format!("s/c.u{element}")) - expected).abs() < 1e-12);
     }
 }
 
@@ -232,13 +269,7 @@ fn oracle_generated_systems_have_the_values_of_the_standard() {
         for number in 0..SYSTEMS {
             archive.add_chain(&mut random, number);
         }
-        archive.write(&bench, &fmus);
-        bench.says(&["run", "x.ssp", "--force", "--quiet"]);
-        let text = bench.text("out/x/results.csv");
-        let mut lines = text.lines();
-        let names: Vec<&str> = lines.next().unwrap().split(',').collect();
-        let last: Vec<f64> =
-            lines.next_back().unwrap().split(',').map(|cell| cell.parse().unwrap()).collect();
+        let (names, last) = last_row(&bench, &archive.structure(), &fmus);
         for (name, expected) in &archive.expected {
             let place = names.iter().position(|found| found == name).unwrap();
             let allowed = 1e-10 * (1.0 + expected.abs());

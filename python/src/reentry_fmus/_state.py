@@ -148,10 +148,10 @@ def vector(moment: npt.ArrayLike) -> Vector:
         given = np.asarray(moment)
         # NumPy would read texts and truth values, and leave out imaginary parts and masks.
         parts = moment if isinstance(moment, (list, tuple)) else [moment]
-        is_none = given.dtype.kind in "SUcb" or any(
+        is_other = given.dtype.kind in "SUcb" or any(
             isinstance(part, (bool, np.bool_)) or np.ma.is_masked(part) for part in parts
         )
-        components = np.array(np.nan if is_none else given, dtype=np.float64)
+        components = np.array(np.nan if is_other else given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         components = np.array(np.nan)
     if components.shape != (3,) or not np.isfinite(components).all():
