@@ -105,11 +105,11 @@ def test_oracle_the_open_loop_is_that_of_matrices_by_hand(law, steps, attitude):
     found, expected = open_loop(law, attitude, steps * PERIOD[law]), by_hand(law, attitude, steps)
     for frequency in np.geomspace(1e-2, 0.99 * np.pi / PERIOD[law], 30):
         ours, theirs = (value(system, frequency) for system in (found, expected))
-        # Slower than the responses are long, two integrators are known by the sensitivity only.
-        if frequency > 0.2:
-            assert np.abs(ours - theirs).max() <= 1e-6 * np.abs(theirs).max()
+        # Two integrators whose eigenvalues are off by the rate s are off by (s/ω)².
+        near = 1e-6 * max(1.0, (0.03 / frequency) ** 2)
+        assert np.abs(ours - theirs).max() <= near * np.abs(theirs).max()
         ours, theirs = (np.linalg.inv(np.eye(3) + loop) for loop in (ours, theirs))
-        assert np.abs(ours - theirs).max() <= 1e-6
+        assert np.abs(ours - theirs).max() <= near * np.abs(theirs).max() and np.abs(ours - theirs).max() <= 1e-9
 
 
 @pytest.mark.parametrize("attitude", ATTITUDES)
@@ -209,6 +209,8 @@ def test_oracle_surfaces_give_small_motions_the_margins_of_the_loop_without_them
     arguments = [part for value in arguments[2:] for part in ("--set", value)]
     law_of = ["--fmu", f"controller={law}.fmu"]
     found = json.loads(call("margins", experiment, "--json", *law_of, *arguments))
+    # The power of TwoLoopSMC's reaching law is the only edge: all surfaces together have none.
+    assert ("sides" in found) is (law == "TwoLoopSMC")
     ideal = json.loads(call("margins", FOLDER / "margins" / "rest.toml", "--json", *law_of, *arguments))
     assert found["together"]["disk"]["alpha"] == pytest.approx(ideal["together"]["disk"]["alpha"], rel=5e-3)
     gain = found["together"]["classical"]["gain_above"]["value"]
@@ -216,16 +218,15 @@ def test_oracle_surfaces_give_small_motions_the_margins_of_the_loop_without_them
     # The gain of TwoLoopSMC depends on the amplitude. Smaller motions drown in what the allocator's iterations leave.
     if (start := {"FBL": 3e-5, "CRMPC": 1e-4}.get(law)) is None:
         return
-    # Beyond the margin a small motion grows until the surfaces are too slow for it. Near the margin it
-    # grows no faster than what the allocator's iterations leave.
-    for share, is_stable in ((0.98, True), (1.05, False)):
+    # Beyond the margin a small motion grows until the surfaces are too slow for it.
+    for share, is_stable in ((0.98, True), (1.02, False)):
         rates = [f"plant.initial.{name}={rate * start} deg/s" for name, rate in zip("pqr", (1.3, 1.0, 0.7))]
         more = [f"plant.inertia.scale={1.0 / (share * gain)}", *rates]
         command = ["run", experiment, *law_of, *arguments, *(part for value in more for part in ("--set", value))]
-        call(*command, "--quiet", "--force", "--no-plot", "--stop", "40", "--out", tmp_path / "run")
+        call(*command, "--quiet", "--force", "--no-plot", "--stop", "80", "--out", tmp_path / "run")
         table = pd.read_csv(tmp_path / "run" / "results.csv", index_col="time")
         rates = table[[f"plant.rate.{name}" for name in "pqr"]].abs().max(axis=1)
-        growth = rates[rates.index > 32.0].max() / np.radians(start)
+        growth = rates[rates.index > 64.0].max() / np.radians(start)
         assert (growth < 0.5) if is_stable else (growth > 1.0), f"{share}: {growth}"
 
 
@@ -246,9 +247,7 @@ def test_oracle_margins_do_not_depend_on_the_communication_step(law, step):
     for one, other in zip([*whole["loops"], whole["together"]], [*fine["loops"], fine["together"]]):
         for margin in ("gain_above", "gain_below", "phase", "delay"):
             a, b = (row["classical"][margin] for row in (one, other))
-            # Delays are interpolated between samples.
-            near = 1e-3 if margin == "delay" else 1e-4
-            assert (a is None) == (b is None) and (a is None or b["value"] == pytest.approx(a["value"], rel=near)), margin
+            assert (a is None) == (b is None) and (a is None or b["value"] == pytest.approx(a["value"], rel=1e-4)), margin
         assert other["disk"]["alpha"] == pytest.approx(one["disk"]["alpha"], rel=1e-4)
         assert other["sensitivity"]["value"] == pytest.approx(one["sensitivity"]["value"], rel=1e-3)
 
@@ -259,11 +258,15 @@ def test_a_signal_has_the_same_margins_whatever_else_is_opened():
     for one, other in zip(alone["loops"], beside["loops"]):
         assert other["signal"] == one["signal"]
         for margin in ("gain_above", "phase", "delay"):
-            # Rates arrive every 0.01 s, moments every 0.04 s, and delays are interpolated between samples.
-            near = 1e-3 if margin == "delay" else 1e-6
-            assert other["classical"][margin]["value"] == pytest.approx(one["classical"][margin]["value"], rel=near), margin
+            # Rates arrive every 0.01 s, moments every 0.04 s.
+            assert other["classical"][margin]["value"] == pytest.approx(one["classical"][margin]["value"], rel=1e-6), margin
     # N m and rad/s are compared in their typical magnitudes.
     assert beside["together"]["sensitivity"]["value"] < 10.0
+
+
+def test_margins_are_the_same_from_a_closed_process():
+    command = ["margins", FOLDER / "margins" / "rest.toml", "--fmu", "controller=TwoLoopSMC.fmu", "--json"]
+    assert call(*command, "--isolate") == call(*command, "--isolate=false")
 
 
 @pytest.mark.parametrize(
@@ -274,7 +277,6 @@ def test_a_signal_has_the_same_margins_whatever_else_is_opened():
         ("entry/from-120km.toml", ("--at", "1900", "--open", SIGNALS), 1, "needs its motion beyond"),
         ("crmpc-2022/lqr.toml", ("--at", "10.01", "--open", SIGNALS), 2, "--at 10.01: must be a communication point"),
         ("crmpc-2022/lqr.toml", ("--at", "10", "--open", "plant.momnt.*"), 2, 'did you mean "plant.moment.'),
-        ("crmpc-2022/lqr.toml", ("--at", "10", "--open", SIGNALS, "--isolate"), 2, "--isolate=false puts them into this one"),
     ],
 )
 def test_where_there_is_no_linear_model_none_is_given(experiment, arguments, code, problem):
@@ -303,7 +305,7 @@ def test_a_loop_with_rounded_readings_has_no_verdict():
     changes = [f"{component}.sensor.set=2" for component in ("plant", "estimator")]
     arguments = [part for change in changes for part in ("--set", change)]
     found = margins_in_flight.verdict(["--fmu", "controller=LQR.fmu", *arguments], FOLDER / "margins" / "measured.toml")
-    assert isinstance(found, str) and any(why in found for why in ("do not repeat", "does not respond", "is not linear here"))
+    assert found.startswith("plant failed ") and "it rounds its outputs" in found
 
 
 SINE = """
@@ -342,7 +344,7 @@ def test_oracle_the_loop_in_flight_has_the_frequency_response_of_the_model(law, 
     a, b, c, d = (np.array(found[key]).reshape(-1, found["samples"]) if key in "bd" else np.array(found[key]) for key in "abcd")
     period, samples = found["period"], found["samples"]
     step = period / samples
-    # The gain of TwoLoopSMC depends on the amplitude.
+    # The gain of TwoLoopSMC grows with the amplitude: by 0.4 % from 1e-5 to 1e-4.
     amplitude = 1e-5 if law == "TwoLoopSMC" else 0.01
     (tmp_path / "sine.toml").write_text(SINE.format(rest=FOLDER / "margins" / "rest.toml", law=law))
     for frequency in np.geomspace(0.3, 0.77 * np.pi / step, 5):

@@ -8,12 +8,11 @@ use cosim::error::Error;
 use cosim::experiment::Overrides;
 use cosim::interrupt::Interrupt;
 use cosim::search::named::{Kind, find};
-use cosim::system::System;
 use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
 use fmi_master::quantity::rounded;
 use linear::Matrix;
 use linear::curves::{ResponseCurves, excluded};
-use linear::linearise::{Linearised, Lineariser};
+use linear::linearise::Linearised;
 use linear::margins::{self, Crossing, LoopMargins, Margins};
 use linear::model::{OpenLoop, Step};
 use serde_json::{Value, json};
@@ -68,21 +67,9 @@ impl PrintMargins {
         if open.is_empty() {
             open = asked.ok_or_else(|| missing("--open SIGNAL"))?.open;
         }
-        // What is wrong with the arguments comes first.
-        Lineariser::new(system.clone(), at, &open)?;
-        refuse_closed(&system)?;
-        Ok(linear::linearise::linearise(system, at, &open, interrupt)?)
+        let linearise = || linear::linearise::linearise(system.clone(), at, &open, interrupt);
+        Ok(system.apart(interrupt, &[], linearise)?)
     }
-}
-
-/// Refuses a system whose instances are to run in a closed process, as a model is needed in this
-/// one.
-fn refuse_closed(system: &System) -> Result<(), Error> {
-    if !system.is_closed {
-        return Ok(());
-    }
-    let problem = "its FMUs are to run in a closed process, which gives no model: --isolate=false puts them into this one";
-    Err(Error::experiment(problem))
 }
 
 /// Returns the model as JSON.

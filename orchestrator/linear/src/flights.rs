@@ -25,10 +25,26 @@ pub(crate) struct Response {
     pub(crate) error: f64,
 }
 
+/// When signals change: in one of the equal parts of a sample whose state is kept. Without parts,
+/// they change from there on.
+#[derive(Clone, Copy)]
+pub(crate) struct Pulse {
+    pub(crate) sample: usize,
+    pub(crate) part: u64,
+    pub(crate) parts: u64,
+}
+
+impl Pulse {
+    /// For a whole sample.
+    pub(crate) fn whole(sample: usize) -> Self {
+        Self { sample, part: 0, parts: 1 }
+    }
+}
+
 /// Flies on from the instant at which a run stands.
 ///
 /// All receivers of the opened signals get the values that they had in the closed loop, which was
-/// recorded before, and at one sample the change in addition.
+/// recorded before, and in one sample, or a part of it, the change in addition.
 pub(crate) struct Flights<'a> {
     opening: &'a Opening,
     run: &'a mut Run,
@@ -76,27 +92,39 @@ impl<'a> Flights<'a> {
         Ok(())
     }
 
-    /// Flies `count` samples with the loop opened, from a sample whose state is kept, at which each
+    /// Flies `count` samples with the loop opened, the first being that of the pulse, in which each
     /// signal changes by a multiple of its typical magnitude. Returns the changes that arrive at
     /// each signal, signals by samples.
     pub(crate) fn fly(
         &mut self,
-        sample: usize,
+        pulse: Pulse,
         change: &[f64],
         count: usize,
     ) -> Result<Matrix, Error> {
+        self.fly_seen(pulse, change, count, |_| ())
+    }
+
+    /// Flies as [`Self::fly`] does, and shows the probed values of each communication point.
+    pub(crate) fn fly_seen(
+        &mut self,
+        pulse: Pulse,
+        change: &[f64],
+        count: usize,
+        mut see: impl FnMut(&[f64]),
+    ) -> Result<Matrix, Error> {
         let Opening { signals, receivers, seen, .. } = self.opening;
-        let begin = sample as u64 * self.ticks;
-        self.go_back(sample, self.first + begin)?;
+        let begin = pulse.sample as u64 * self.ticks;
+        self.go_back(pulse.sample, self.first + begin)?;
         let mut response = Matrix::zeros(signals.len(), count);
         for tick in 0..count as u64 * self.ticks {
             let recorded = &self.recorded[(begin + tick) as usize];
             for (receiver, recorded) in receivers.iter().zip(recorded) {
                 let size = receiver.factor * signals[receiver.signal].size;
-                let by = if tick < self.ticks { change[receiver.signal] * size } else { 0.0 };
+                let is_changed = tick * pulse.parts / self.ticks == pulse.part;
+                let by = if is_changed { change[receiver.signal] * size } else { 0.0 };
                 self.run.master.opened(receiver.port).given = Some(recorded + by);
             }
-            self.run.advance(self.first + begin + tick)?;
+            see(self.run.advance(self.first + begin + tick)?);
             if !tick.is_multiple_of(self.ticks) {
                 continue;
             }
@@ -116,14 +144,14 @@ impl<'a> Flights<'a> {
     /// Returns the mean response to a change and to its opposite, per change.
     pub(crate) fn difference(
         &mut self,
-        sample: usize,
+        pulse: Pulse,
         direction: &[f64],
         change: f64,
         count: usize,
     ) -> Result<[Matrix; 2], Error> {
         let mut by = |change: f64| {
             let changes: Vec<f64> = direction.iter().map(|share| share * change).collect();
-            Ok::<_, Error>(self.fly(sample, &changes, count)? / change)
+            Ok::<_, Error>(self.fly(pulse, &changes, count)? / change)
         };
         Ok([by(change)?, by(-change)?])
     }
@@ -134,13 +162,13 @@ impl<'a> Flights<'a> {
     /// as δ falls.
     pub(crate) fn response(
         &mut self,
-        sample: usize,
+        pulse: Pulse,
         direction: &[f64],
         change: f64,
         count: usize,
     ) -> Result<Response, Error> {
-        let [more, less] = self.difference(sample, direction, change, count)?;
-        let [more_half, less_half] = self.difference(sample, direction, 0.5 * change, count)?;
+        let [more, less] = self.difference(pulse, direction, change, count)?;
+        let [more_half, less_half] = self.difference(pulse, direction, 0.5 * change, count)?;
         let (mean, mean_half) = ((&more + &less) * 0.5, (&more_half + &less_half) * 0.5);
         let central = (&mean_half * 4.0 - &mean) / 3.0;
         let error = (mean_half - mean).amax() / 3.0;

@@ -6,6 +6,7 @@
 //! linear model of the fewest states ([`realisation`]). [`margins`] gives the loop's distance from
 //! instability.
 
+mod culprit;
 pub mod curves;
 mod flights;
 pub mod linearise;

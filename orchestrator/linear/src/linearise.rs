@@ -4,7 +4,8 @@
 //! of them is the response of the open loop, which is realised as a model of the fewest states.
 
 use crate::Matrix;
-use crate::flights::{Flights, Response};
+use crate::culprit::culprit;
+use crate::flights::{Flights, Pulse, Response};
 use crate::margins::rate;
 use crate::model::{OpenLoop, Step};
 use crate::opening::Opening;
@@ -18,6 +19,7 @@ use fmi_master::clock::Clock;
 use fmi_master::instance::CallFailure;
 use fmi_master::quantity::rounded;
 use fmu_import::warnings;
+use serde::{Deserialize, Serialize};
 
 /// Longest period that is looked for: a time (s), but so many samples at least and at most.
 const LONGEST_PERIOD: f64 = 0.25;
@@ -30,8 +32,14 @@ const MEMORY: [usize; 2] = [24, 200];
 /// Number of samples, from the first response on, that are compared to find a period.
 const COMPARED: usize = 6;
 /// Changes that are tried, in relation to the typical magnitude of a signal. A loop that is not
-/// smooth needs a small one, and one that iterates a larger one.
-const CHANGES: [f64; 5] = [1e-3, 1e-5, 1e-7, 1e-8, 1e-9];
+/// smooth needs a small one, and one that iterates a larger one, which also is less rounded.
+const CHANGES: [f64; 7] = [1e-1, 1e-2, 1e-3, 1e-5, 1e-7, 1e-8, 1e-9];
+/// Change that shows when the loop responds, in relation to the same.
+const SHOWS: f64 = 1e-3;
+/// Change that shows which component rounds its outputs.
+const SMALL: f64 = 1e-7;
+/// Largest number of parts of a sample that are told apart.
+const PARTS: u64 = 5;
 /// Difference of responses, relative to the largest, that counts as none. Differences of periods
 /// count as equal if they are in this relation to the least one.
 const EQUAL: f64 = 1e-6;
@@ -50,7 +58,7 @@ const DEVIATES: f64 = 0.02;
 const CERTAIN: f64 = 3.0;
 
 /// A linearised loop.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Linearised {
     /// Time of the instant, s.
     pub time: f64,
@@ -112,7 +120,7 @@ impl Lineariser {
     /// # Errors
     /// Returns an error if the time is not a communication point, or if a signal is not connected.
     pub fn new(mut system: System, time: f64, open: &[String]) -> Result<Self, Error> {
-        let opening = Opening::new(&system, time, open)?;
+        let opening = Opening::new(&mut system, time, open)?;
         let (start, step) = (system.clock.start(), system.clock.step());
         let sample = LONGEST_PERIOD.max(opening.held as f64 * step);
         let samples = 2 * LONGEST[1] + 2 * MEMORY[1] + COMPARED;
@@ -164,14 +172,18 @@ impl Lineariser {
                 best = next;
             }
         }
-        if best.deviation > DEVIATES {
-            return Err(self.failure(format!(
-                "a linear model is {:.0} % off the response to a change: its samples of {} s show too little of the motion, or it is not linear here",
+        let unstable = self.is_unstable(&best.found.open);
+        // An unstable loop leaves the instant fast, and needs no exact model.
+        let most = if matches!(unstable, Ok(true)) { REPEATS } else { DEVIATES };
+        if best.deviation > most {
+            let problem = format!(
+                "a linear model is {:.0} % off the response to a change: its samples of {} s show too little of the motion, or the loop changes meanwhile",
                 1e2 * best.deviation,
                 rounded(self.sampling(flights))
-            )));
+            );
+            return Err(self.failure_in(flights, problem));
         }
-        self.check_verdict(&best.found.open)?;
+        unstable?;
         Ok(best.found)
     }
 
@@ -193,15 +205,14 @@ impl Lineariser {
         let central = lags(&|response| &response.central);
         let largest = largest(&central);
         if largest == 0.0 {
-            return Err(self.silent(count as f64 * sampling));
+            return Err(self.silent(flights, count));
         }
         let all = || phases.iter().flatten();
         let noise = all().map(|one| one.error / largest).fold(0.0, f64::max);
         if noise > DEVIATES {
-            return Err(self.failure(format!(
-                "responses to changes of different sizes differ by {:.0} %: a component rounds its outputs, or the loop is not linear here",
-                1e2 * noise
-            )));
+            let problem =
+                format!("responses to changes of different sizes differ by {:.0} %", 1e2 * noise);
+            return Err(self.failure_in(flights, problem));
         }
         let tolerance = SMALLEST.max(drift).max(noise);
         let steps = realise(&central, memory, tolerance);
@@ -245,7 +256,7 @@ impl Lineariser {
         }
         let count = window(step) + 4 * longest;
         flights.record(count, 0)?;
-        let response = flights.fly(0, &self.direction(CHANGES[0]), count)?;
+        let response = flights.fly(Pulse::whole(0), &self.direction(SHOWS), count)?;
         let least = EQUAL * response.amax();
         let changes: Vec<usize> = (1..count)
             .filter(|lag| (response.column(*lag) - response.column(lag - 1)).amax() > least)
@@ -267,7 +278,10 @@ impl Lineariser {
         let count = begin + COMPARED;
         let mut best = (CHANGES[0], f64::INFINITY);
         for change in CHANGES {
-            let response = flights.response(at, &self.direction(1.0), change, window(sampling))?;
+            let (pulse, direction) = (Pulse::whole(at), self.direction(1.0));
+            // A component may refuse a large change.
+            let tried = flights.response(pulse, &direction, change, window(sampling));
+            let Ok(response) = tried else { continue };
             let error = response.error / response.central.amax().max(f64::MIN_POSITIVE);
             if error < best.1 {
                 best = (change, error);
@@ -281,8 +295,8 @@ impl Lineariser {
         while drifts.last().is_none_or(|drift| *drift > EQUAL) && drifts.len() < longest {
             let period = drifts.len() + 1;
             for sample in responses.len()..longest + period {
-                let [more, less] =
-                    flights.difference(sample, &self.direction(1.0), change, count)?;
+                let (pulse, direction) = (Pulse::whole(sample), self.direction(1.0));
+                let [more, less] = flights.difference(pulse, &direction, change, count)?;
                 responses.push((more + less) * 0.5);
             }
             let largest = responses.iter().map(Matrix::amax).fold(f64::MIN_POSITIVE, f64::max);
@@ -294,7 +308,12 @@ impl Lineariser {
         let place = drifts.iter().position(|drift| *drift <= equal).unwrap_or(0);
         let drift = drifts[place];
         if drift > REPEATS {
-            return Err(self.failure(format!("responses to a change do not repeat within {longest} steps of {} s, but differ by {:.0} %: the loop has no linear model here, or a longer period", rounded(sampling), 1e2 * drift)));
+            let problem = format!(
+                "responses to a change do not repeat within {longest} steps of {} s, but differ by {:.0} %: the loop has no linear model here, or a longer period",
+                rounded(sampling),
+                1e2 * drift
+            );
+            return Err(self.failure_in(flights, problem));
         }
         Ok(Trial { change, period: place + 1, drift })
     }
@@ -308,25 +327,27 @@ impl Lineariser {
         count: usize,
     ) -> Result<(usize, usize), Error> {
         for sample in 0..longest {
-            let response = flights.fly(sample, &self.direction(CHANGES[0]), count)?;
+            let response = flights.fly(Pulse::whole(sample), &self.direction(SHOWS), count)?;
             let begins = response.row_iter().filter_map(|row| row.iter().position(|by| *by != 0.0));
             if let Some(begin) = begins.max() {
                 return Ok((sample, begin));
             }
         }
-        Err(self.silent(count as f64 * self.sampling(flights)))
+        Err(self.silent(flights, count))
     }
 
-    /// Returns the error of a loop that does not respond within this time (s).
-    fn silent(&self, time: f64) -> Error {
-        self.failure(format!(
-            "the loop does not respond to a change of {} within {} s: a component may delay it for longer, or round or hold its outputs",
+    /// Returns the error of a loop that does not respond within so many samples.
+    fn silent(&self, flights: &mut Flights, count: usize) -> Error {
+        let problem = format!(
+            "the loop does not respond to a change of {} within {} s",
             self.opening.signals[0].name,
-            rounded(time)
-        ))
+            rounded(count as f64 * self.sampling(flights))
+        );
+        self.failure_in(flights, problem)
     }
 
-    /// Takes the responses to a change of each signal at each sample of a period.
+    /// Takes the responses at each sample of a period: to a change of each signal in its first part,
+    /// then in its second, and so on.
     fn responses(
         &self,
         flights: &mut Flights,
@@ -334,12 +355,18 @@ impl Lineariser {
         count: usize,
     ) -> Result<Vec<Vec<Response>>, Error> {
         let channels = self.opening.signals.len();
-        let mut one = |sample: usize, signal: usize| {
+        let steps = flights.ticks / self.opening.held;
+        // A loop with a period of several samples would take long.
+        let most = if trial.period == 1 { PARTS } else { 1 };
+        let parts = (1..=most).rev().find(|parts| steps.is_multiple_of(*parts)).unwrap_or(1);
+        let mut one = |sample: usize, change: usize| {
             let mut direction = vec![0.0; channels];
-            direction[signal] = 1.0;
-            flights.response(sample, &direction, trial.change, count)
+            direction[change % channels] = 1.0;
+            let pulse = Pulse { sample, part: (change / channels) as u64, parts };
+            flights.response(pulse, &direction, trial.change, count)
         };
-        let mut phase = |sample| (0..channels).map(|signal| one(sample, signal)).collect();
+        let changes = parts as usize * channels;
+        let mut phase = |sample| (0..changes).map(|change| one(sample, change)).collect();
         (0..trial.period).map(&mut phase).collect()
     }
 
@@ -354,22 +381,40 @@ impl Lineariser {
         flights.ticks as f64 * self.system.clock.step()
     }
 
-    /// Checks that the responses show whether the closed loop is stable.
-    fn check_verdict(&self, open: &OpenLoop) -> Result<(), Error> {
+    /// Returns whether the closed loop is unstable.
+    ///
+    /// # Errors
+    /// Returns an error if the responses do not show it.
+    fn is_unstable(&self, open: &OpenLoop) -> Result<bool, Error> {
         let closed = open.closed(&vec![1.0; open.channels()]);
-        let Some(eigenvalue) = closed.map(|a| dominant(&a)) else { return Ok(()) };
+        let Some(eigenvalue) = closed.map(|a| dominant(&a)) else { return Ok(true) };
         let rate = rate(eigenvalue, open);
         if eigenvalue.norm() < 1.0 || rate > open.slowest {
-            return Ok(());
+            return Ok(eigenvalue.norm() >= 1.0);
         }
         Err(self.failure(format!(
             "the stability of the loop is undecided, because the error of the responses hides a motion of {rate:.1e}/s"
         )))
     }
 
+    /// Returns an error that names the component because of which there is no linear model, if
+    /// there is one.
+    fn failure_in(&self, flights: &mut Flights, problem: String) -> Error {
+        let count = window(self.sampling(flights));
+        let changes = [SMALL, 0.5 * CHANGES[0], CHANGES[0]].map(|change| self.direction(change));
+        match culprit(&self.opening, flights, &changes, count) {
+            Ok(Some((component, why))) => self.failure_of(component, format!("{problem}; {why}")),
+            Ok(None) => self.failure(problem),
+            Err(error) => error,
+        }
+    }
+
     fn failure(&self, message: String) -> Error {
-        let receiver = &self.opening.receivers[0].port;
-        let component = self.system.components[receiver.component].name.clone();
+        self.failure_of(self.opening.receivers[0].port.component, message)
+    }
+
+    fn failure_of(&self, component: usize, message: String) -> Error {
+        let component = self.system.components[component].name.clone();
         let time = self.system.clock.time(self.opening.first);
         Error::Call { component, time, failure: CallFailure::answer("linearise", message) }
     }
@@ -380,11 +425,14 @@ fn window(sampling: f64) -> usize {
     (LONGEST_TIME / sampling).ceil() as usize + 2 * COMPARED
 }
 
-/// Joins the responses of all signals to changes of each of them, one matrix for each lag.
+/// Joins the responses of all signals to each change, one matrix for each lag.
 fn joined(phase: &[Response], of: &dyn Fn(&Response) -> &Matrix) -> Lags {
     let columns: Vec<&Matrix> = phase.iter().map(of).collect();
     (0..columns[0].ncols())
-        .map(|lag| Matrix::from_fn(columns.len(), columns.len(), |row, by| columns[by][(row, lag)]))
+        .map(|lag| {
+            let rows = columns[0].nrows();
+            Matrix::from_fn(rows, columns.len(), |row, by| columns[by][(row, lag)])
+        })
         .collect()
 }
 

@@ -1,10 +1,10 @@
 //! Discrete models in state-space form.
 
 use crate::Matrix;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// One step of a linear system: x⁺ = A x + B u, y = C x + D u.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Step {
     /// Matrix A, states after by states before.
     pub a: Matrix,
@@ -17,25 +17,28 @@ pub struct Step {
 }
 
 /// A signal at which the loop is opened.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Signal {
     /// Name of the variable, `component.variable`.
     pub name: String,
     /// Unit of the variable, or an empty text.
     pub unit: String,
     /// Typical magnitude of the variable, by which signals of different units are compared.
-    #[serde(skip)]
+    #[serde(rename = "nominal")]
     pub size: f64,
 }
 
 /// The open loop over one common period of its components: from the values injected at the opened
 /// signals to those that arrive there. The loop is closed by injecting the arriving values: the
 /// feedback is positive, and the return ratio is the negative of this system.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OpenLoop {
     /// Step of one period. Its inputs and outputs are all signals at the first sample of the
     /// period, then all at the second, and so on.
     pub step: Step,
+    /// Matrices B and D for changes in parts of a sample, between which a delay ends: for each
+    /// sample all signals in its first part, then all in its second, and so on.
+    parts: [Matrix; 2],
     /// Length of the period, s.
     pub period: f64,
     /// Number of samples in a period at which the opened signals may change.
@@ -47,21 +50,33 @@ pub struct OpenLoop {
 }
 
 impl OpenLoop {
-    /// Makes the open loop of the steps at each sample of a period, whose inputs and outputs are
-    /// the signals in their typical magnitudes.
+    /// Makes the open loop of the steps at each sample of a period. Their outputs are the signals in
+    /// their typical magnitudes, their inputs these in each part of the sample.
     pub(crate) fn new(steps: &[Step], signals: &[Signal], sampling: f64, slowest: f64) -> Self {
         let Step { a, mut b, mut c, mut d } = lifted(steps);
+        let size = |place: usize| signals[place % signals.len()].size;
+        for place in 0..d.ncols() {
+            b.column_mut(place).unscale_mut(size(place));
+            d.column_mut(place).unscale_mut(size(place));
+        }
         for place in 0..d.nrows() {
-            let size = signals[place % signals.len()].size;
-            b.column_mut(place).unscale_mut(size);
-            d.column_mut(place).unscale_mut(size);
-            c.row_mut(place).scale_mut(size);
-            d.row_mut(place).scale_mut(size);
+            c.row_mut(place).scale_mut(size(place));
+            d.row_mut(place).scale_mut(size(place));
         }
         let samples = steps.len();
-        let period = sampling * samples as f64;
-        let signals = signals.to_vec();
-        Self { step: Step { a, b, c, d }, period, samples, signals, slowest }
+        let inputs = d.ncols() / samples;
+        let whole = |parts: &Matrix| {
+            let mut whole = Matrix::zeros(parts.nrows(), d.nrows());
+            for (place, part) in parts.column_iter().enumerate() {
+                let signal = place / inputs * signals.len() + place % signals.len();
+                let mut column = whole.column_mut(signal);
+                column += part;
+            }
+            whole
+        };
+        let step = Step { a, b: whole(&b), c, d: whole(&d) };
+        let (parts, period, signals) = ([b, d], sampling * samples as f64, signals.to_vec());
+        Self { step, parts, period, samples, signals, slowest }
     }
 
     /// Returns the number of opened signals.
@@ -86,40 +101,45 @@ impl OpenLoop {
     }
 
     /// Returns the matrix A of the closed loop in which some signals, given by their indices,
-    /// arrive later by a number of samples; `None` if it would be algebraic. A part of a sample is
-    /// interpolated between the two beside it.
+    /// arrive later by a number of samples; `None` if it would be algebraic. A delay that ends
+    /// within a part of a sample is interpolated between the ends of this part.
     pub fn delayed(&self, late: &[usize], samples: f64) -> Option<Matrix> {
-        let Step { a, b, c, d } = &self.step;
-        let (channels, rows, states) = (self.channels(), d.nrows(), a.nrows());
+        let ([b, d], Step { a, c, .. }) = (&self.parts, &self.step);
+        let (channels, rows, states) = (self.channels(), c.nrows(), a.nrows());
+        let parts = d.ncols() / rows;
         // What is received, by what arrives in this period and by what arrived late in the samples
         // before it, the latest ones last.
-        let whole = samples.ceil() as usize;
-        let past = whole * late.len();
-        let (mut now, mut before) = (Matrix::zeros(rows, rows), Matrix::zeros(rows, past));
-        for row in 0..rows {
-            let (sample, channel) = (row / channels, row % channels);
+        let delay = samples * parts as f64;
+        let whole = delay.ceil() as usize;
+        let newer = whole as f64 - delay;
+        let before = whole.div_ceil(parts);
+        let past = before * late.len();
+        let (mut now, mut then) = (Matrix::zeros(d.ncols(), rows), Matrix::zeros(d.ncols(), past));
+        for row in 0..d.ncols() {
+            let (part, channel) = (row / channels, row % channels);
             let Some(place) = late.iter().position(|late| *late == channel) else {
-                now[(row, row)] = 1.0;
+                now[(row, part / parts * channels + channel)] = 1.0;
                 continue;
             };
-            let newer = whole as f64 - samples;
             for (age, share) in [(whole, 1.0 - newer), (whole.saturating_sub(1), newer)] {
-                match sample.checked_sub(age) {
-                    Some(sample) => now[(row, sample * channels + channel)] += share,
-                    None => before[(row, (whole + sample - age) * late.len() + place)] += share,
+                if let Some(part) = part.checked_sub(age) {
+                    now[(row, part / parts * channels + channel)] += share;
+                } else {
+                    let sample = before - (age - part).div_ceil(parts);
+                    then[(row, sample * late.len() + place)] += share;
                 }
             }
         }
-        let inverse = (Matrix::identity(rows, rows) - &now * d).try_inverse()?;
-        let (received, received_past) = (&inverse * now * c, inverse * before);
-        let (arriving, arriving_past) = (c + d * &received, d * &received_past);
+        let inverse = (Matrix::identity(rows, rows) - d * &now).try_inverse()?;
+        let (arriving, arriving_past) = (&inverse * c, inverse * (d * &then));
         let mut all = Matrix::zeros(states + past, states + past);
-        all.view_mut((0, 0), (states, states)).copy_from(&(a + b * received));
+        all.view_mut((0, 0), (states, states)).copy_from(&(a + b * (&now * &arriving)));
+        let received_past = now * &arriving_past + then;
         all.view_mut((0, states), (states, past)).copy_from(&(b * received_past));
         for place in 0..past {
             let (sample, channel) = (place / late.len(), late[place % late.len()]);
             let mut row = all.row_mut(states + place);
-            if let Some(sample) = (sample + self.samples).checked_sub(whole) {
+            if let Some(sample) = (sample + self.samples).checked_sub(before) {
                 let arrives = sample * channels + channel;
                 row.columns_mut(0, states).copy_from(&arriving.row(arrives));
                 row.columns_mut(states, past).copy_from(&arriving_past.row(arrives));

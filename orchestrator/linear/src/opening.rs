@@ -25,11 +25,17 @@ pub(crate) struct Opening {
     pub(crate) receivers: Vec<Receiver>,
     /// Receiver of each signal at which it is seen what arrives: the fastest one.
     pub(crate) seen: Vec<usize>,
+    /// Number of components.
+    pub(crate) components: usize,
+    /// Connected outputs: component, and place among the probed values.
+    pub(crate) outputs: Vec<(usize, usize)>,
+    /// Connections: place of the output among the probed values, and component of the input.
+    pub(crate) wires: Vec<(usize, usize)>,
 }
 
 impl Opening {
     /// Finds the instant at a time (s), and the connected inputs and outputs with these names.
-    pub(crate) fn new(system: &System, time: f64, patterns: &[String]) -> Result<Self, Error> {
+    pub(crate) fn new(system: &mut System, time: f64, patterns: &[String]) -> Result<Self, Error> {
         let ports = ports(system, patterns)?;
         let signal = |port: &Port| Signal {
             name: system.name(*port),
@@ -59,7 +65,16 @@ impl Opening {
         let seen: Vec<usize> = (0..ports.len()).filter_map(fastest).collect();
         let held = u64::from(seen.iter().map(every).min().unwrap_or(1));
         let first = tick_at(&system.clock, time)?.next_multiple_of(held);
-        Ok(Self { first, held, signals: ports.iter().map(signal).collect(), receivers, seen })
+        let signals = ports.iter().map(signal).collect();
+        let (mut outputs, mut ends) = (Vec::new(), Vec::new());
+        for (wire, _) in &wires {
+            let name = system.name(wire.from);
+            let place = system.probe(&name).map_err(Error::experiment)?.place;
+            outputs.push((wire.from.component, place));
+            ends.push((place, wire.to.component));
+        }
+        let components = system.components.len();
+        Ok(Self { first, held, signals, receivers, seen, components, outputs, wires: ends })
     }
 }
 

@@ -166,8 +166,11 @@ pub fn sensitivity(open: &OpenLoop, frequency: f64) -> ComplexMatrix {
     for i in 0..resolvent.nrows() {
         resolvent[(i, i)] += z;
     }
-    let Some(states) = resolvent.lu().solve(&complex(&input)) else { return infinite() };
-    let lifted = complex(&output) * states + complex(&e);
+    let mut lifted = complex(&e);
+    if !a.is_empty() {
+        let Some(states) = resolvent.lu().solve(&complex(&input)) else { return infinite() };
+        lifted += complex(&output) * states;
+    }
     let (count, samples) = (open.channels(), open.samples);
     if samples == 1 {
         return lifted;

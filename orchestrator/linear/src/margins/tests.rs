@@ -158,6 +158,51 @@ fn oracle_the_disk_is_the_one_that_the_nyquist_curve_touches() {
 }
 
 #[test]
+fn oracle_a_loop_without_states_has_the_margins_of_its_gain() {
+    // One signal is half the other, at once: S = (I − D)⁻¹ = [1, 0; 1/2, 1], and the structured
+    // singular value of S − I/2 is the largest of its diagonal.
+    let d = Matrix::from_row_slice(2, 2, &[0.0, 0.0, 0.5, 0.0]);
+    let none = |rows, columns| Matrix::zeros(rows, columns);
+    let step = Step { a: none(0, 0), b: none(0, 2), c: none(2, 0), d };
+    let found = margins(&OpenLoop::new(&[step], &double_integrators(2, 0).signals, STEP, 0.0));
+    let together = found.together.unwrap();
+    assert!(found.stable && together.classical.gain_above.is_none());
+    assert!((together.disk.alpha - 2.0).abs() < 1e-9, "{}", together.disk.alpha);
+    // The largest singular value of S is the root of σ − 1/σ = 1/2.
+    let largest = 0.25 + 1.0625_f64.sqrt();
+    assert!((together.sensitivity.value - largest).abs() < 1e-9, "{}", together.sensitivity.value);
+}
+
+#[test]
+fn oracle_parts_of_a_sample_delay_a_held_signal_exactly() {
+    // The pulse over each quarter of a sample, of which the whole one is the sum.
+    let parts = 4;
+    let whole = double_integrator(0);
+    let held = |begin: f64, end: f64| [0.5 * (end * end - begin * begin), end - begin];
+    let mut quarters = whole.clone();
+    (quarters.b, quarters.d) = (Matrix::zeros(2, parts), Matrix::zeros(1, parts));
+    for part in 0..parts {
+        let left = |part: usize| STEP * (1.0 - part as f64 / parts as f64);
+        quarters.b.column_mut(part).copy_from_slice(&held(left(part + 1), left(part)));
+    }
+    let signals = double_integrators(1, 0).signals;
+    let open = OpenLoop::new(&[quarters], &signals, STEP, 0.0);
+    assert!((&open.step.b - &whole.b).amax() < 1e-15);
+    // A quarter of a sample late, the command before acts for a quarter: a state more.
+    let late = held(0.75 * STEP, STEP);
+    let mut exact = Matrix::zeros(3, 3);
+    exact.view_mut((0, 0), (2, 2)).copy_from(&(&whole.a + &whole.b * &whole.c));
+    for row in 0..2 {
+        exact[(row, 0)] += late[row] * ANGLE;
+        exact[(row, 1)] += late[row] * RATE;
+        exact[(row, 2)] = late[row];
+    }
+    (exact[(2, 0)], exact[(2, 1)]) = (-ANGLE, -RATE);
+    let found = open.delayed(&[0], 0.25).unwrap();
+    assert!((found - exact).amax() < 1e-12);
+}
+
+#[test]
 fn a_loop_that_is_unstable_has_no_margins() {
     let found = margins(&double_integrators(1, 20));
     assert!(!found.stable && found.loops.is_empty() && found.spectral_radius > 1.0);
