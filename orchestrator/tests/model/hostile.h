@@ -79,12 +79,45 @@ static int large_file(void) {
     while (written < 200 && write(file, block, sizeof block) == sizeof block) written++;
     return file >= 0 && written == 200;
 }
-/* Pipes are the way to the orchestrator, to which the process may say what it likes. */
+static int is_pipe(int file) { struct stat about; return fstat(file, &about) == 0 && S_ISFIFO(about.st_mode); }
+/* One pipe is the way to the orchestrator; messages of others on it are tried below. */
 static int inherited_file(void) {
-    int is_written = 0;
-    struct stat about;
-    for (int file = 3; file < 64; file++) is_written |= fstat(file, &about) == 0 && !S_ISFIFO(about.st_mode) && write(file, "x", 1) == 1;
-    return is_written;
+    int is_written = 0, pipes = 0;
+    for (int file = 3; file < 64; file++) {
+        if (is_pipe(file)) pipes++;
+        else is_written |= write(file, "x", 1) == 1;
+    }
+    return is_written || pipes != 1;
+}
+/* The orchestrator must refuse them while the instance is still being called, and nothing may be read from it. */
+static int says(const char *bytes, size_t count) {
+    usleep(50000);
+    for (int file = 3; file < 64; file++)
+        if (is_pipe(file) && write(file, bytes, count) != (ssize_t)count) return 0;
+    sleep(20);
+    return 1;
+}
+static int say_anything(void) { return says("anything that is said", 22); }
+static int say_much(void) { return says("m\xff\xff\xff\x0fxxxxxxxxxxx", 16); }
+static int say_nothing_is_closed(void) { return says("r\4\0\0\0xxxxxxxxlock", 17); }
+static int say_it_is_done(void) {
+    usleep(50000);
+    for (int file = 3; file < 64; file++)
+        if (is_pipe(file) && write(file, "d\0\0\0\0xxxxxxxx", 13) != 13) return 1;
+    sleep(20);
+    return 1;
+}
+static int lock_file(void) {
+    struct flock lock = {.l_type = F_RDLCK};
+    return fcntl(open("/etc/ld.so.cache", O_RDONLY), F_SETLK, &lock) == 0;
+}
+static int waits(void *none) { for (;;) pause(); return none != NULL; }
+static int many_threads(void) {
+    static char stacks[20000][1024] __attribute__((aligned(16)));
+    int flags = CLONE_VM | CLONE_FS | CLONE_FILES | CLONE_SIGHAND | CLONE_THREAD | CLONE_SYSVSEM;
+    for (int i = 0; i < 20000; i++)
+        if (clone(waits, stacks[i] + 1024, flags, NULL) < 0) return 0;
+    return 1;
 }
 static int environment(void) { return getenv("SECRET_KEY") != NULL; }
 static int own_environment(void) { return opens("/proc/self/environ", O_RDONLY) || opens("/proc/self/cmdline", O_RDONLY); }
@@ -103,6 +136,10 @@ static int parent_environment(void) { return opens_of_parent("environ", O_RDONLY
 static int parent_memory(void) { return opens_of_parent("mem", O_RDWR); }
 static int parent_files(void) { return opens_of_parent("fd", O_RDONLY | O_DIRECTORY); }
 static int parent_command(void) { return opens_of_parent("cmdline", O_RDONLY); }
+static int parent_links(void) {
+    return opens_of_parent("cwd", O_RDONLY | O_DIRECTORY) || opens_of_parent("root", O_RDONLY | O_DIRECTORY) || opens_of_parent("exe", O_RDONLY) ||
+           opens_of_parent("fd/0", O_RDWR | O_NONBLOCK) || opens_of_parent("fd/1", O_RDWR | O_NONBLOCK) || opens_of_parent("fd/2", O_RDWR | O_NONBLOCK);
+}
 static int parent_score(void) { return opens_of_parent("oom_score_adj", O_WRONLY); }
 static int all_processes(void) { return opens("/proc", O_RDONLY | O_DIRECTORY); }
 static int shared_folder(void) { return opens("/dev/shm/fresh-of-an-instance", O_RDWR | O_CREAT); }
@@ -251,6 +288,7 @@ static const Attempt ATTEMPTS[] = {
     A(memory_file), A(shared_memory), A(segment), A(queues), A(lock_memory), A(much_memory), A(page_faults), A(new_process), A(borrowed_process),
     A(newer_process), A(new_program), A(program_by_descriptor), A(ring), A(kernel_programs), A(events), A(kernel_log), A(set_clock), A(name_host),
     A(load_module), A(restart), A(become_root), A(capabilities), A(personality_of_old), A(dump), A(ports),
+    A(say_anything), A(say_much), A(say_nothing_is_closed), A(say_it_is_done), A(lock_file), A(many_threads), A(parent_links),
 };
 
 /* Makes the attempt with this number, from 1, and says what became of it. */

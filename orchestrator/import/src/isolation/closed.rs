@@ -5,6 +5,7 @@
 use super::ended::ended;
 use super::inside::{self, Kind, Link, Pipes};
 use super::page::{Doing, Page, SLOTS};
+use super::seal::Seal;
 use super::{Closing, Ended, LastCall};
 use crate::folder::TemporaryFolder;
 use crate::warnings;
@@ -15,6 +16,7 @@ use std::fs::File;
 use std::io::{self, PipeReader, Read, Write};
 use std::ops::ControlFlow;
 use std::os::fd::{AsRawFd, OwnedFd};
+use std::os::unix::fs::MetadataExt;
 use std::os::unix::process::ExitStatusExt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitStatus;
@@ -26,8 +28,10 @@ const END_TIMEOUT: Duration = Duration::from_millis(800);
 const PAUSE: Duration = Duration::from_millis(1);
 /// Largest time that counts between two looks: the supervisor itself may have been stopped.
 const LONGEST_PAUSE: Duration = Duration::from_millis(100);
-/// Largest number of bytes of a message.
-const LARGEST: usize = 1 << 28;
+/// Largest number of threads of a process.
+const THREADS: u64 = 512;
+/// Size of a pipe, in bytes. No more are read at a time: an instance may write as fast as that.
+const PIPE: usize = 1 << 20;
 /// Largest number of bytes of a printed line that is passed on.
 const LINE: usize = 2000;
 
@@ -37,6 +41,7 @@ pub struct Closed {
     page: Page,
     /// What it sends.
     messages: PipeReader,
+    seal: Seal,
     received: Vec<u8>,
     prints: PipeReader,
     /// The line that it is printing, and the last one.
@@ -66,7 +71,7 @@ fn pipe() -> io::Result<(PipeReader, File)> {
     fcntl_setfl(&reader, OFlags::NONBLOCK)?;
     // As large as any user may have it, so that a quick run need not wait between two looks.
     // SAFETY: the call takes numbers only.
-    unsafe { libc::fcntl(reader.as_raw_fd(), libc::F_SETPIPE_SZ, 1 << 20) };
+    unsafe { libc::fcntl(reader.as_raw_fd(), libc::F_SETPIPE_SZ, PIPE) };
     Ok((reader, File::from(OwnedFd::from(writer))))
 }
 
@@ -89,13 +94,13 @@ impl Closed {
         let home = TemporaryFolder::new()?;
         let page = Page::new()?;
         let ((messages, outlet), (prints, print)) = (pipe()?, pipe()?);
-        let supervisor = std::process::id();
+        let (seal, supervisor) = (Seal::new(), std::process::id());
         // SAFETY: this process has one thread. The new one leaves its values as they are when it
         // ends, so that nothing of this one is dropped twice.
         let process = unsafe { libc::fork() };
         if process == 0 {
             page.write_here();
-            let pipes = Pipes { messages: outlet, prints: print };
+            let pipes = Pipes { messages: outlet, seal, prints: print };
             let work = || {
                 let link = inside::enter(pipes, closing, home.path(), supervisor);
                 let (kind, reason) = match link {
@@ -120,6 +125,7 @@ impl Closed {
             process,
             page,
             messages,
+            seal,
             received: Vec::new(),
             prints,
             printing: Vec::new(),
@@ -177,18 +183,16 @@ impl Closed {
         // What it said before its end is there once it has ended.
         let has_ended = self.has_ended();
         self.read_prints();
-        let heard = self.read_messages(hear);
+        let heard = self.read_messages(hear).map_err(|reason| self.garbled(&reason));
         let late = self.late();
         match self.status {
-            Some(status) if has_ended && status.success() && self.is_done => {
-                Some(heard.map_err(|reason| self.failed(&reason)))
-            }
+            Some(status) if has_ended && status.success() && self.is_done => Some(heard),
             Some(status) if has_ended => Some(Err(self.failed(&ended(status)))),
-            _ => heard.err().or(late).map(|reason| {
-                let failed = self.failed(&reason);
+            _ => {
+                let failed = heard.err().or_else(|| late.map(|reason| self.failed(&reason)))?;
                 self.kill();
-                Err(failed)
-            }),
+                Some(Err(failed))
+            }
         }
     }
 
@@ -214,7 +218,7 @@ impl Closed {
         }
     }
 
-    /// Returns why the process is too late, if it is.
+    /// Returns why the process is too late or has too many threads, if it is or has.
     fn late(&mut self) -> Option<String> {
         let now = Instant::now();
         let passed = now.duration_since(self.looked).min(LONGEST_PAUSE);
@@ -230,6 +234,11 @@ impl Closed {
         if let Some(ending) = &mut self.ending {
             *ending += passed;
         }
+        // A folder has two links besides those to its folders.
+        let tasks = std::fs::metadata(format!("/proc/{}/task", self.process));
+        if tasks.is_ok_and(|tasks| tasks.nlink() > THREADS + 2) {
+            return Some(format!("its process has more than {THREADS} threads"));
+        }
         if self.ending > Some(END_TIMEOUT) {
             return Some("its process was asked to end, and did not".into());
         }
@@ -239,15 +248,12 @@ impl Closed {
 
     /// Reads what the process has printed.
     fn read_prints(&mut self) {
-        let mut bytes = [0; 4096];
-        while let Ok(count @ 1..) = self.prints.read(&mut bytes) {
-            for byte in &bytes[..count] {
-                if *byte != b'\n' && self.printing.len() < LINE {
-                    self.printing.push(*byte);
-                    continue;
-                }
-                self.end_line();
+        for byte in read(&mut self.prints) {
+            if byte != b'\n' && self.printing.len() < LINE {
+                self.printing.push(byte);
+                continue;
             }
+            self.end_line();
         }
         if self.status.is_some() {
             self.end_line();
@@ -272,39 +278,54 @@ impl Closed {
         hear: &mut dyn FnMut(M) -> ControlFlow<()>,
     ) -> Result<(), String> {
         let undecodable = || "its process sent what cannot be decoded".to_string();
-        let mut room = vec![0; 1 << 16];
-        while let Ok(count @ 1..) = self.messages.read(&mut room) {
-            self.received.extend_from_slice(&room[..count]);
-            let mut begin = 0;
-            while let [kind, a, b, c, d, rest @ ..] = &self.received[begin..] {
-                let length = u32::from_le_bytes([*a, *b, *c, *d]) as usize;
-                if length > LARGEST {
-                    return Err(undecodable());
-                }
-                let Some(content) = rest.get(..length) else { break };
-                let text = || String::from_utf8_lossy(content).into_owned();
-                match *kind {
-                    b'm' => {
-                        let message = postcard::from_bytes(content).map_err(|_| undecodable())?;
-                        if hear(message).is_break() {
-                            self.pass_on(Some(libc::SIGTERM));
-                        }
-                    }
-                    b'l' => print(&text()),
-                    b'w' => self.warnings.push(text()),
-                    b'r' => self.refusal = Some(text()),
-                    b'd' => self.is_done = true,
-                    _ => return Err(undecodable()),
-                }
-                begin += 5 + length;
+        self.received.extend(read(&mut self.messages));
+        let mut received = std::mem::take(&mut self.received);
+        let mut left = received.as_slice();
+        while let Some((header, rest)) = left.split_first_chunk() {
+            let (kind, length) = self.seal.opened(header).ok_or_else(undecodable)?;
+            let Some((content, rest)) = rest.split_at_checked(length) else { break };
+            if self.is_done {
+                return Err(undecodable());
             }
-            self.received.drain(..begin);
+            self.seal.number += 1;
+            let text = || String::from_utf8_lossy(content).into_owned();
+            match kind {
+                b'm' => {
+                    let message = postcard::from_bytes(content).map_err(|_| undecodable())?;
+                    if hear(message).is_break() {
+                        self.pass_on(Some(libc::SIGTERM));
+                    }
+                }
+                b'l' => print(&text()),
+                b'w' => self.warnings.push(text()),
+                // No instance has been called before.
+                b'r' if self.seal.number == 1 => self.refusal = Some(text()),
+                b'd' => self.is_done = true,
+                _ => return Err(undecodable()),
+            }
+            left = rest;
         }
+        let begin = received.len() - left.len();
+        received.drain(..begin);
+        self.received = received;
         Ok(())
+    }
+
+    /// Describes an end because of what was sent. Only a call that has lasted since the process was
+    /// looked at before has certainly sent it.
+    fn garbled(&self, reason: &str) -> Ended {
+        let calls = self.page.calls();
+        let lasts = |place: &usize| calls[*place] % 2 == 1 && calls[*place] == self.calls[*place].0;
+        let culprit = (0..SLOTS).find(lasts).and_then(|place| self.page.culprit(Some(place)));
+        self.told(reason, culprit)
     }
 
     /// Describes the end of the process.
     fn failed(&self, reason: &str) -> Ended {
+        self.told(reason, self.page.culprit(self.late))
+    }
+
+    fn told(&self, reason: &str, culprit: Option<Doing>) -> Ended {
         if let Some(reason) = &self.refusal {
             return Ended::Refused(format!("this system cannot close {reason}"));
         }
@@ -318,12 +339,20 @@ impl Closed {
         let failure = CallFailure::new("a thread of its own", message);
         let mut last =
             LastCall { component: None, time: self.page.time(), case: None, part: None, failure };
-        if let Some(Doing { component, call, time, case, part }) = self.page.culprit(self.late) {
+        if let Some(Doing { component, call, time, case, part }) = culprit {
             let failure = CallFailure { call: call.into(), ..last.failure };
             last = LastCall { component: Some(component), time, case, part, failure };
         }
         Ended::Failed(Box::new(last))
     }
+}
+
+/// Reads what a pipe holds.
+fn read(from: &mut PipeReader) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    // It fails where there is no more.
+    let _ = from.take(PIPE as u64).read_to_end(&mut bytes);
+    bytes
 }
 
 /// Prints a line of a log, without what could change the terminal.

@@ -3,6 +3,7 @@
 #![allow(unsafe_code)]
 
 use super::Closing;
+use super::seal::{HEADER, Seal};
 use super::{page, sandbox};
 use crate::{law, warnings};
 use parking_lot::Mutex;
@@ -38,22 +39,24 @@ pub(super) enum Kind {
 /// Ends of pipes that a process holds.
 pub(super) struct Pipes {
     pub(super) messages: File,
+    pub(super) seal: Seal,
     pub(super) prints: File,
 }
 
-/// Where this process sends its messages, if it is closed, and room for one of them.
-static OUTLET: Mutex<Option<(File, Vec<u8>)>> = Mutex::new(None);
+/// Where this process sends its messages, if it is closed, how they are sealed, and room for one.
+static OUTLET: Mutex<Option<(File, Seal, Vec<u8>)>> = Mutex::new(None);
 
 /// Sends a message, unless this process is not closed. Returns whether it is.
 fn send(kind: Kind, write: impl FnOnce(Vec<u8>) -> postcard::Result<Vec<u8>>) -> io::Result<bool> {
     let mut outlet = OUTLET.lock();
-    let Some((file, room)) = outlet.as_mut() else { return Ok(false) };
+    let Some((file, seal, room)) = outlet.as_mut() else { return Ok(false) };
     let mut bytes = std::mem::take(room);
     bytes.clear();
-    bytes.extend([kind as u8, 0, 0, 0, 0]);
+    bytes.extend([0; HEADER]);
     let mut bytes = write(bytes).map_err(io::Error::other)?;
-    let length = u32::try_from(bytes.len() - 5).map_err(io::Error::other)?;
-    bytes[1..5].copy_from_slice(&length.to_le_bytes());
+    let header = seal.header(kind as u8, bytes.len() - HEADER)?;
+    bytes[..HEADER].copy_from_slice(&header);
+    seal.number += 1;
     file.write_all(&bytes)?;
     *room = bytes;
     Ok(true)
@@ -112,13 +115,13 @@ impl Write for Messages {
 /// # Errors
 /// Returns what cannot be closed. Then nothing may be run here.
 pub(super) fn enter(
-    Pipes { messages, prints }: Pipes,
+    Pipes { messages, seal, prints }: Pipes,
     closing: &Closing,
     home: &Path,
     supervisor: u32,
 ) -> Result<Link, String> {
     apart(supervisor, &messages, prints).map_err(|error| error.to_string())?;
-    *OUTLET.lock() = Some((messages, Vec::new()));
+    *OUTLET.lock() = Some((messages, seal, Vec::new()));
     // SAFETY: this process has one thread.
     unsafe { clear_environment(home) };
     limit(closing).map_err(|error| format!("the process's resources: {error}"))?;

@@ -8,6 +8,7 @@
 //! | `page` | the calls that are being made, in memory that both processes see |
 //! | `closed` | the supervisor's side: the process is forked, heard, watched and ended |
 //! | `inside` | the closed process: what it gives up, and the messages that it sends |
+//! | `seal` | by which its messages are told from what instances write |
 //! | `sandbox` | what it may still reach |
 //! | `ended` | how it has ended, in words |
 //!
@@ -25,6 +26,8 @@ mod open;
 pub(crate) mod page;
 #[cfg(target_os = "linux")]
 mod sandbox;
+#[cfg(target_os = "linux")]
+mod seal;
 
 #[cfg(target_os = "linux")]
 pub use closed::Closed;

@@ -34,7 +34,9 @@ impl Text {
     fn get(&self) -> String {
         // SAFETY: the text is read as bytes, which may change meanwhile.
         let bytes = unsafe { self.0.get().read_volatile() };
-        String::from_utf8_lossy(bytes.split(|byte| *byte == 0).next().unwrap_or_default()).into()
+        let text = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
+        // Nothing that could change the terminal.
+        String::from_utf8_lossy(text).replace(char::is_control, " ")
     }
 }
 

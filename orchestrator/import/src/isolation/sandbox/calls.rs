@@ -138,17 +138,15 @@ const OLDER: &[c_long] = &[
 #[cfg(not(target_arch = "x86_64"))]
 const OLDER: &[c_long] = &[];
 
-/// Commands of `fcntl`. Those that name a process or a signal are not among them.
-const FCNTL: [c_int; 9] = [
+/// Commands of `fcntl`. Those that name a process or a signal are not among them, nor those that lock
+/// a file, which others may want to lock too.
+const FCNTL: [c_int; 6] = [
     libc::F_DUPFD,
     libc::F_DUPFD_CLOEXEC,
     libc::F_GETFD,
     libc::F_SETFD,
     libc::F_GETFL,
     libc::F_SETFL,
-    libc::F_GETLK,
-    libc::F_SETLK,
-    libc::F_SETLKW,
 ];
 
 /// Requests of `ioctl`: whether it is a terminal, how much there is to read, how it is read.
