@@ -30,7 +30,7 @@ def watched(strict, tmp_path, monkeypatch):
 
     logs = tmp_path / "logs"
     logs.mkdir()
-    monkeypatch.setenv("STRICT_LOGS", str(logs))
+    monkeypatch.setenv("LC_STRICT_LOGS", str(logs))
 
     class Watched:
         folder = tmp_path / "fmu"
@@ -118,6 +118,8 @@ USES = {
     "margins": ["margins", "lqr", "--at", "1", "--open", "plant.moment.*", "--model", "out.json"],
     "exchange": ["run", "exchange.toml", "--out", "out", "--quiet", "--stop", "2"],
     "campaign": ["campaign", "few.toml", "--out", "out", "--jobs", "1", "--quiet", "--stop", "2"],
+    # The folder of a kept case is the only one of the user in which a closed process may write: also the log.
+    "closed": ["campaign", "few.toml", "--out", "out", "--jobs", "1", "--quiet", "--stop", "2", "--isolate"],
 }
 CAMPAIGN = f"""#:schema {EXPERIMENTS}/../../schema/campaign.json
 title = "Few cases"
@@ -127,6 +129,9 @@ cases = 4
 [[vary]]
 parameter = "plant.disturbance.seed"
 case = 1
+
+[keep]
+every = 4
 """
 
 
@@ -142,8 +147,13 @@ MODES = {"2": ("complete", "continuous"), "3": ("step", "continuous")}
 
 @pytest.mark.parametrize("use", USES)
 @pytest.mark.parametrize("version", ["2", "3"])
-def test_the_orchestrator_keeps_to_the_standard(watched, tmp_path, version, use):
+def test_the_orchestrator_keeps_to_the_standard(watched, tmp_path, monkeypatch, version, use):
     units = [watched(name, version) for name in ("ReentryPlant", "LQR")]
+    if use == "closed":
+        kept = tmp_path / "out" / "cases" / "0"
+        monkeypatch.setenv("LC_STRICT_LOGS", str(kept))
+        for unit in units:
+            unit.log = kept / unit.log.name
     (tmp_path / "few.toml").write_text(CAMPAIGN)
     (tmp_path / "exchange.toml").write_text(EXCHANGE)
     command = [program("orchestrator"), *USES[use], "--fmu-dir", units[0].folder]
@@ -169,7 +179,7 @@ def recorded(strict, tmp_path_factory):
         with pytest.MonkeyPatch.context() as patch:
             logs = folder / f"{version}{kind}"
             logs.mkdir()
-            patch.setenv("STRICT_LOGS", str(logs))
+            patch.setenv("LC_STRICT_LOGS", str(logs))
             more = {"use_event_mode": True, "early_return_allowed": False} if version == "3" and kind == "CoSimulation" else {}
             simulate_fmu(str(path), fmi_type=kind, stop_time=0.2, solver="CVode", output_interval=0.04, **more)
         return read_model_description(path), read(next(logs.iterdir()))

@@ -1,6 +1,7 @@
 """A library between an importer and an FMU, made from the headers of the standard: it passes every
 call on and writes it down with its result, one JSON object in each line, in a file of the folder
-STRICT_LOGS that has the name of the library."""
+LC_STRICT_LOGS that has the name of the library. (A closed process has no other variables than those
+of the language.)"""
 
 from __future__ import annotations
 
@@ -36,7 +37,7 @@ static void *find(const char *name) {
         char path[4096];
         dladdr((void *)find, &self);
         snprintf(path, sizeof path, "%%s.real", self.dli_fname);
-        const char *folder = getenv("STRICT_LOGS"), *file = strrchr(self.dli_fname, '/');
+        const char *folder = getenv("LC_STRICT_LOGS"), *file = strrchr(self.dli_fname, '/');
         if (folder && file) snprintf(log_path, sizeof log_path, "%%s%%s.log", folder, file);
         library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
         if (!library) { fprintf(stderr, "%%s\n", dlerror()); abort(); }

@@ -87,9 +87,8 @@ impl<'a> Flight<'a> {
 
     /// Lets cases go on that break a limit.
     #[must_use]
-    pub fn without_ends(mut self) -> Self {
-        self.instances.replace_bounds(Vec::new());
-        self
+    pub fn without_ends(self) -> Self {
+        Self { instances: self.instances.ending_at(Vec::new()), ..self }
     }
 
     /// Leaves out the margins of cases, which are flown for their curves.
@@ -107,17 +106,15 @@ impl<'a> Flight<'a> {
     ///
     /// # Errors
     /// The errors are those of [`Self::fly`], and of files that cannot be written.
-    pub fn keep(&mut self, case: u64, folder: &Path, title: &str) -> Result<Row, Error> {
+    pub fn keep(mut self, case: u64, folder: &Path, title: &str) -> Result<(), Error> {
         let system = self.instances.system();
         let mut watch = Watch::new(system)?;
         let mut recorder = system.recorder(folder, false)?;
-        let bounds = self.instances.replace_bounds(Vec::new());
         let values = self.plan.sweep.values(case);
-        let row = self.fly_with(case, values, &mut [&mut recorder, &mut watch]);
-        self.instances.replace_bounds(bounds);
+        let flown = self.fly_with(case, values, &mut [&mut recorder, &mut watch]);
         recorder.finish()?;
         watch.draw(&folder.join("plot.svg"), title)?;
-        row
+        flown.map(drop)
     }
 
     /// Flies the case with this number.

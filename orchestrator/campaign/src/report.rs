@@ -32,9 +32,8 @@ const SHOWN: usize = 5;
 /// Returns an error if a file cannot be read or written, or if the work was asked to end.
 pub fn write(plan: &Plan, findings: &Findings, out: &Path, options: &Options) -> Result<(), Error> {
     let cases = Reader::open(&out.join("cases.parquet"))?;
-    let mut flight = Flight::new(plan, false, &options.interrupt)?;
     let kept_cases = chosen(plan, &cases)?;
-    keep(plan, &mut flight, &kept_cases, out, &options.interrupt)?;
+    keep(plan, &kept_cases, out, &options.interrupt)?;
     let ranking = ranking(plan);
     let ranked = match &ranking {
         Some(name) => worst(&cases.column(name)?.numbers(), SHOWN),
@@ -62,16 +61,19 @@ fn ranking(plan: &Plan) -> Option<String> {
 /// Flies cases again and writes their full results.
 fn keep(
     plan: &Plan,
-    flight: &mut Flight,
     cases: &BTreeSet<u64>,
     out: &Path,
     interrupt: &Interrupt,
 ) -> Result<(), Error> {
-    let system = flight.system().clone();
+    let system = Flight::new(plan, false, interrupt)?.system().clone();
     for case in cases {
         let folder = out.join("cases").join(case.to_string());
         let (title, _) = plan.write_case(*case, &folder)?;
-        let fly = || flight.keep(*case, &folder, &title).map(drop);
+        // The flight is over, and its instances are freed, where it was begun.
+        let fly = || {
+            let flight = Flight::new(plan, false, interrupt)?.without_ends();
+            flight.keep(*case, &folder, &title)
+        };
         system.apart(interrupt, &[&folder], fly)?;
     }
     Ok(())

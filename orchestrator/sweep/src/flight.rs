@@ -118,11 +118,6 @@ impl<'a> Flight<'a> {
         self.lineariser = None;
     }
 
-    /// Replaces the bounds that end a case, and returns those before.
-    pub fn replace_bounds(&mut self, bounds: Vec<Bound>) -> Vec<Bound> {
-        std::mem::replace(&mut self.bounds, bounds)
-    }
-
     /// Returns the system whose cases are flown. Signals that are probed now are seen by observers.
     pub fn system(&mut self) -> &mut System {
         &mut self.system
