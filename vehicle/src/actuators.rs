@@ -15,7 +15,7 @@ use crate::aerodynamics::{Flow, SurfaceTable};
 use crate::effectors::{
     Effectors, JETS, Jets, SURFACE_NAMES, SURFACES, Surfaces, moment_of_tables,
 };
-use crate::error::Error;
+use crate::error::{Error, not_negative};
 use crate::time::tolerance;
 use nalgebra::{SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
@@ -112,10 +112,7 @@ impl Actuators {
     /// Names the value that is out of range.
     pub fn new(config: &Config) -> Result<Self, Error> {
         let scale = config.aerodynamics_scale;
-        if !(scale >= 0.0 && scale.is_finite()) {
-            let problem = format!("= {scale} must not be negative");
-            return Err(Error::parameter("aerodynamics.scale", problem));
-        }
+        not_negative("aerodynamics.scale", scale, "")?;
         let Effectors { min, max, rate, jet_moments, .. } = config.effectors;
         Ok(Self {
             condition: [config.dynamic_pressure, config.mach],

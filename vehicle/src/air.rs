@@ -2,7 +2,7 @@
 
 use crate::atmosphere::air_anywhere;
 use crate::axes::{HORIZONTAL, LEVEL};
-use crate::error::Error;
+use crate::error::{Error, finite, not_negative, positive};
 use crate::math::{cos, exp};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -162,20 +162,12 @@ impl Air {
     /// Names the value at fault.
     pub fn check(&self) -> Result<(), Error> {
         let refuse = |name: String, problem: String| Err(Error::parameter(name, problem));
-        for (name, value, least, needed) in [
-            ("air.seaLevelDensity", self.sea_level_density, 0.0, "not be negative"),
-            ("density.scale", self.scale, 0.0, "not be negative"),
-            ("air.scaleHeight", self.scale_height, f64::MIN_POSITIVE, "be positive"),
-            ("gust.duration", self.gust.duration, f64::MIN_POSITIVE, "be positive"),
-        ] {
-            if !(value >= least && value.is_finite()) {
-                return refuse(name.into(), format!("= {value} must {needed}"));
-            }
-        }
+        not_negative("air.seaLevelDensity", self.sea_level_density, "")?;
+        not_negative("density.scale", self.scale, "")?;
+        positive("air.scaleHeight", self.scale_height, "")?;
+        positive("gust.duration", self.gust.duration, "")?;
         let Gust { velocity, start, .. } = &self.gust;
-        if !(velocity.iter().all(|part| part.is_finite()) && start.is_finite()) {
-            return refuse("gust".into(), "holds a value that is not finite".into());
-        }
+        finite("gust", velocity.iter().chain([start]))?;
         let Some(used) = self.profile.get(..self.rows) else {
             return refuse(
                 "air.rows".into(),
@@ -184,10 +176,7 @@ impl Air {
         };
         for (i, row) in used.iter().enumerate() {
             let number = i + 1;
-            if !(row.density >= 0.0 && row.density.is_finite()) {
-                let problem = format!("= {} must not be negative", row.density);
-                return refuse(format!("air.densityRatio[{number}]"), problem);
-            }
+            not_negative(format!("air.densityRatio[{number}]"), row.density, "")?;
             for (part, direction) in row.wind.iter().zip(["north", "east"]) {
                 if !part.is_finite() {
                     let name = format!("air.wind.{direction}[{number}]");

@@ -1,6 +1,6 @@
 //! US Standard Atmosphere 1976 from sea level to 120 km.
 
-use crate::error::Error;
+use crate::error::{Error, not_negative};
 use crate::math::{exp, ln, powf, powi};
 use serde::{Deserialize, Serialize};
 use settings::Declared;
@@ -168,10 +168,7 @@ impl Flight {
     /// # Errors
     /// Names the value that is out of range.
     pub fn dynamic_pressure(&self) -> Result<f64, Error> {
-        if !(self.mach >= 0.0 && self.mach.is_finite()) {
-            let problem = format!("= {} must not be negative", self.mach);
-            return Err(Error::parameter("flight.mach", problem));
-        }
+        not_negative("flight.mach", self.mach, "")?;
         let air = air(self.altitude)?;
         Ok(0.5 * air.density * powi(self.mach * air.sound_speed, 2))
     }

@@ -1,7 +1,7 @@
 //! Rotation sequence for the calibration of sensors. The platform turns so that every direction
 //! fixed in space points along every direction of the body at some time.
 
-use crate::error::Error;
+use crate::error::{Error, finite};
 use crate::kinematics::Kinematics;
 use crate::math::sin_cos;
 use crate::state::{BETA_LIMIT, State, state};
@@ -35,10 +35,7 @@ impl Sequence {
     /// Names the value at fault by its path in the configuration of the plant.
     pub fn check(&self, initial: &Vector3<f64>) -> Result<(), Error> {
         let values = [self.alpha_rate, self.sigma_rate, self.beta_amplitude, self.beta_frequency];
-        if !values.iter().all(|value| value.is_finite()) {
-            let problem = "holds a value that is not finite";
-            return Err(Error::parameter("calibration", problem));
-        }
+        finite("calibration", &values)?;
         let reach = initial.y.abs() + self.beta_amplitude.abs();
         if reach >= BETA_LIMIT {
             let problem = format!(

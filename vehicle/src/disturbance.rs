@@ -5,7 +5,7 @@ mod table;
 
 use crate::axes::AXES;
 use crate::dynamics::RigidBody;
-use crate::error::Error;
+use crate::error::{Error, finite, not_negative, positive};
 use crate::kinematics::Kinematics;
 use crate::math::sin;
 use crate::noise::{Stream, uniform};
@@ -141,21 +141,9 @@ impl Disturbance {
     /// Names the value at fault by its path in the configuration of the plant.
     pub fn check(&self) -> Result<(), Error> {
         let refuse = |name: &'static str, problem: String| Err(Error::parameter(name, problem));
-        if !(self.bound >= 0.0 && self.bound.is_finite()) {
-            return refuse(
-                "disturbance.bound",
-                format!("= {} rad/s2 must not be negative", self.bound),
-            );
-        }
-        if !(self.period > 0.0 && self.period.is_finite()) {
-            return refuse("disturbance.period", format!("= {} s must be positive", self.period));
-        }
-        if !(self.square_period > 0.0 && self.square_period.is_finite()) {
-            return refuse(
-                "disturbance.square.period",
-                format!("= {} s must be positive", self.square_period),
-            );
-        }
+        not_negative("disturbance.bound", self.bound, " rad/s2")?;
+        positive("disturbance.period", self.period, " s")?;
+        positive("disturbance.square.period", self.square_period, " s")?;
         if !self.direction.iter().all(|component| component.abs() <= 1.0) {
             return refuse("disturbance.direction", "must have components between -1 and 1".into());
         }
@@ -166,13 +154,10 @@ impl Disturbance {
             );
         }
         let sine = &self.sine;
-        let finite = |vector: &Vector3<f64>| vector.iter().all(|value| value.is_finite());
-        let wave_is_finite = |wave: &MomentWave| {
-            finite(&wave.amplitude) && wave.frequency.is_finite() && wave.phase.is_finite()
-        };
-        if !(finite(&sine.offset) && sine.waves.iter().all(wave_is_finite)) {
-            return refuse("disturbance.sine", "holds a value that is not finite".into());
-        }
+        let waves = sine.waves.iter();
+        let waves =
+            waves.flat_map(|wave| wave.amplitude.iter().chain([&wave.frequency, &wave.phase]));
+        finite("disturbance.sine", sine.offset.iter().chain(waves))?;
         self.table.check()
     }
 

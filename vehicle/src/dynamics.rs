@@ -1,6 +1,6 @@
 //! Rigid-body attitude dynamics of Chai 2022, (1)–(5).
 
-use crate::error::Error;
+use crate::error::{Error, positive};
 use crate::kinematics;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -42,9 +42,7 @@ impl Inertia {
         for (name, value) in
             [("inertia.Ixx", self.Ixx), ("inertia.Iyy", self.Iyy), ("inertia.Izz", self.Izz)]
         {
-            if !(value > 0.0 && value.is_finite()) {
-                return refuse(name, format!("= {value} kg m2 must be positive"));
-            }
+            positive(name, value, " kg m2")?;
         }
         let Some(body) = RigidBody::new(self.matrix() * scale) else {
             let bound = (self.Ixx * self.Izz).sqrt();

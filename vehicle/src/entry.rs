@@ -16,7 +16,7 @@ use crate::actuators;
 use crate::aerodynamics::{Aerodynamics, Flow};
 use crate::air::{Air, Conditions};
 use crate::axes::{ANGLES, FLOW};
-use crate::error::Error;
+use crate::error::{Error, not_negative, positive};
 use crate::kinematics::{Kinematics, Sines, sines};
 use crate::math::{asin, atan2};
 use crate::platform::{body_from_velocity, body_from_velocity_at, velocity_from_level};
@@ -192,13 +192,9 @@ impl Config {
             ("planet.rate", rate),
         ];
         for (name, value) in planet {
-            if !(value >= 0.0 && value.is_finite()) {
-                return refuse(name, format!("= {value} must not be negative"));
-            }
+            not_negative(name, value, "")?;
         }
-        if radius <= 0.0 {
-            return refuse("planet.radius", format!("= {radius} m must be positive"));
-        }
+        positive("planet.radius", radius, " m")?;
         let Deviations { lift, drag, side, moment, pitch } = self.deviations;
         for (name, value) in [
             ("aerodynamics.lift.scale", lift),
@@ -206,18 +202,12 @@ impl Config {
             ("aerodynamics.side.scale", side),
             ("aerodynamics.moment.scale", moment),
         ] {
-            if !(value >= 0.0 && value.is_finite()) {
-                return refuse(name, format!("= {value} must not be negative"));
-            }
+            not_negative(name, value, "")?;
         }
         if !pitch.is_finite() {
             return refuse("aerodynamics.pitch.offset", "is not finite".into());
         }
-        let frequency = self.following.frequency;
-        if !(frequency > 0.0 && frequency.is_finite()) {
-            let problem = format!("= {frequency} rad/s must be positive");
-            return refuse("prescribed.frequency", problem);
-        }
+        positive("prescribed.frequency", self.following.frequency, " rad/s")?;
         self.air.check()?;
         for ((ending, _), value) in MOTION.iter().zip(motion) {
             if !value.is_finite() {

@@ -93,6 +93,40 @@ impl Error {
     }
 }
 
+/// Refuses a configuration value that is not positive and finite. `unit` follows it in the message.
+pub(crate) fn positive(
+    name: impl Into<Cow<'static, str>>,
+    value: f64,
+    unit: &str,
+) -> Result<(), Error> {
+    let problem = || format!("= {value}{unit} must be positive");
+    (value > 0.0 && value.is_finite())
+        .then_some(())
+        .ok_or_else(|| Error::parameter(name, problem()))
+}
+
+/// Refuses a configuration value that is negative or not finite. `unit` follows it in the message.
+pub(crate) fn not_negative(
+    name: impl Into<Cow<'static, str>>,
+    value: f64,
+    unit: &str,
+) -> Result<(), Error> {
+    let problem = || format!("= {value}{unit} must not be negative");
+    (value >= 0.0 && value.is_finite())
+        .then_some(())
+        .ok_or_else(|| Error::parameter(name, problem()))
+}
+
+/// Refuses configuration values that are not finite.
+pub(crate) fn finite<'a>(
+    name: impl Into<Cow<'static, str>>,
+    values: impl IntoIterator<Item = &'a f64>,
+) -> Result<(), Error> {
+    let problem = "holds a value that is not finite";
+    let all = values.into_iter().all(|value| value.is_finite());
+    all.then_some(()).ok_or_else(|| Error::parameter(name, problem))
+}
+
 fn place(line: Option<u64>, column: Option<&str>) -> String {
     let line = line.map(|line| format!(", line {line}")).unwrap_or_default();
     let column = column.map(|column| format!(", column {column}")).unwrap_or_default();

@@ -4,7 +4,7 @@
 //! period, and it travels with this sample on the line.
 
 use crate::axes::{Entry, QUATERNION};
-use crate::error::Error;
+use crate::error::{Error, not_negative};
 use crate::fault::{Fault, FaultKind};
 use crate::frames::Place;
 use crate::noise::{normal_pair, uniform};
@@ -166,10 +166,7 @@ impl Devices {
             ("star.period", star.period),
             ("star.noise", star.noise),
         ] {
-            if !(value >= 0.0 && value.is_finite()) {
-                let problem = format!("= {value} must not be negative");
-                return Err(Error::parameter(format!("sensor.{name}"), problem));
-            }
+            not_negative(format!("sensor.{name}"), value, "")?;
         }
         let (top, bottom) = (gnss.blackout_top, gnss.blackout_bottom);
         if !(top.is_finite() && bottom <= top && star.least_altitude.is_finite()) {

@@ -6,7 +6,7 @@
 //! angle grows *against* the right-hand rule about the velocity, as the signs of R require.
 
 use crate::axes::LEVEL;
-use crate::error::Error;
+use crate::error::{Error, finite, not_negative};
 use crate::kinematics::{Kinematics, Sines, sines};
 use crate::math::sin_cos;
 use crate::trajectory::{TRAJECTORY, Trajectory};
@@ -34,17 +34,8 @@ impl Surroundings {
     /// # Errors
     /// Names the value at fault by its path in the configuration of the plant.
     pub fn check(&self) -> Result<(), Error> {
-        let refuse = |name: &'static str, problem: String| Err(Error::parameter(name, problem));
-        if !(self.gravity >= 0.0 && self.gravity.is_finite()) {
-            return refuse(
-                "sensor.gravity",
-                format!("= {} m/s2 must not be negative", self.gravity),
-            );
-        }
-        if !self.field.iter().all(|value| value.is_finite()) {
-            return refuse("sensor.field", "holds a value that is not finite".into());
-        }
-        Ok(())
+        not_negative("sensor.gravity", self.gravity, " m/s2")?;
+        finite("sensor.field", &self.field)
     }
 }
 

@@ -6,7 +6,7 @@
 //! tick. It is committed when time moves on.
 
 use crate::axes::AXES;
-use crate::error::Error;
+use crate::error::{Error, positive};
 use crate::fault::FaultKind;
 use crate::fixes::{Devices, Fixes};
 use crate::frames;
@@ -184,9 +184,7 @@ impl Config {
     fn check(&self) -> Result<(), Error> {
         let refuse = |name: &'static str, problem: String| Err(Error::parameter(name, problem));
         let Line { period, delay, drop_probability, .. } = self.line;
-        if !(period > 0.0 && period.is_finite()) {
-            return refuse("sensor.period", format!("= {period} s must be positive"));
-        }
+        positive("sensor.period", period, " s")?;
         if !(delay >= 0.0 && delay / period <= IN_FLIGHT as f64) {
             let problem =
                 format!("= {delay} s must lie between 0 and {IN_FLIGHT} times sensor.period");

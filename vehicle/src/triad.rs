@@ -3,7 +3,7 @@
 //! resolution of the converter.
 
 use crate::axes::AXES;
-use crate::error::Error;
+use crate::error::{Error, finite, not_negative};
 use crate::math::exp;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -126,24 +126,11 @@ impl Triad {
             ("range", self.range),
             ("resolution", self.resolution),
         ] {
-            if !(value >= 0.0 && value.is_finite()) {
-                let problem = format!("= {value} must not be negative");
-                return Err(Error::parameter(format!("{path}.{name}"), problem));
-            }
+            not_negative(format!("{path}.{name}"), value, "")?;
         }
-        for (name, finite) in [
-            ("matrix", self.matrix.iter().all(|value| value.is_finite())),
-            ("bias", self.bias.iter().all(|value| value.is_finite())),
-            ("drift", self.drift.iter().all(|value| value.is_finite())),
-        ] {
-            if !finite {
-                return Err(Error::parameter(
-                    format!("{path}.{name}"),
-                    "holds a value that is not finite",
-                ));
-            }
-        }
-        Ok(())
+        finite(format!("{path}.matrix"), &self.matrix)?;
+        finite(format!("{path}.bias"), &self.bias)?;
+        finite(format!("{path}.drift"), &self.drift)
     }
 
     /// Returns the sensor with the bias that it has drifted to after the time `elapsed` (s).

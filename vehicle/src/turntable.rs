@@ -6,7 +6,7 @@
 //! Θ_c are the vehicle's angles, rounded by a converter. They are given at the sensors' samples and
 //! lie on a straight line between them, so that the solution has a closed form.
 
-use crate::error::Error;
+use crate::error::{Error, not_negative};
 use crate::kinematics::Kinematics;
 use crate::math::{exp, ln};
 use crate::platform::Pose;
@@ -67,9 +67,7 @@ impl Turntable {
             ("turntable.rate", config.rate),
             ("turntable.resolution", config.resolution),
         ] {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(Error::parameter(name, format!("= {value} must not be negative")));
-            }
+            not_negative(name, value, "")?;
         }
         Ok((config.bandwidth > 0.0).then_some(Self { config: *config, before: None, last: None }))
     }

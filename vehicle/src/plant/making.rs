@@ -4,7 +4,7 @@ use super::Plant;
 use super::config::{Calibration, Config};
 use crate::actuators::{self, Actuators};
 use crate::effectors::Surfaces;
-use crate::error::Error;
+use crate::error::{Error, finite, not_negative, positive};
 use crate::sensors::Sensors;
 use crate::state::{BETA_LIMIT, angles};
 use crate::time::check_resolution;
@@ -18,22 +18,16 @@ impl Plant {
     /// Names the value of the configuration that is out of range.
     pub fn new(config: &Config, start_time: f64) -> Result<Self, Error> {
         let refuse = |name: &'static str, problem: String| Err(Error::parameter(name, problem));
-        if !(config.inertia_scale > 0.0 && config.inertia_scale.is_finite()) {
-            return refuse("inertia.scale", format!("= {} must be positive", config.inertia_scale));
-        }
+        positive("inertia.scale", config.inertia_scale, "")?;
         let body = config.inertia.body(config.inertia_scale)?;
-        if !config.initial.iter().all(|value| value.is_finite()) {
-            return refuse("initial", "holds a value that is not finite".into());
-        }
+        finite("initial", &config.initial)?;
         if config.initial[1].abs() >= BETA_LIMIT {
             return refuse(
                 "initial.beta",
                 format!("= {} deg must lie within 90 deg", config.initial[1].to_degrees()),
             );
         }
-        if !(config.step > 0.0 && config.step.is_finite()) {
-            return refuse("integrator.step", format!("= {} s must be positive", config.step));
-        }
+        positive("integrator.step", config.step, " s")?;
         check_motion(config)?;
         if !config.earth_rate.is_finite() {
             return refuse("trajectory.earthRate", "is not finite".into());
@@ -47,12 +41,7 @@ impl Plant {
             return refuse("actuation.delay", problem);
         }
         let resolution = config.moment_resolution;
-        if !(resolution >= 0.0 && resolution.is_finite()) {
-            return refuse(
-                "actuation.resolution",
-                format!("= {resolution} N m must not be negative"),
-            );
-        }
+        not_negative("actuation.resolution", resolution, " N m")?;
         if config.actuators.is_some() && resolution > 0.0 {
             let problem = format!(
                 "= {resolution} N m rounds an input moment, and there is none with actuators"
@@ -174,8 +163,7 @@ fn check_motion(config: &Config) -> Result<(), Error> {
             let problem = "prescribes the attitude, which an entry flight does not allow";
             return Err(Error::parameter("calibration.active", problem));
         }
-    } else if !config.motion.iter().all(|value| value.is_finite()) {
-        return Err(Error::parameter("flight", "holds a value that is not finite"));
+        return Ok(());
     }
-    Ok(())
+    finite("flight", &config.motion)
 }
