@@ -222,10 +222,11 @@ fn lasting_errors_and_disturbances_at_their_bounds_contradict_nothing() {
 fn a_fault_that_lasts_is_not_forgiven() {
     for situation in situations() {
         let (_, settings, age) = situation;
-        for size in [2.0, 3.0] {
+        // At 0.6°/s the estimator's errors explain the first two seconds.
+        for (size, latest) in [(0.6, 14.0), (2.0, 10.5), (3.0, 10.5)] {
             let fault = Fault::Bias(size * DEGREE, 0.0);
             let shown = Flight { fault, ..flight(&settings, age, 3) }.fly();
-            assert!(shown.in_force < 10.5 / 40.0, "{}, {size}: {shown:?}", situation.0);
+            assert!(shown.in_force < latest / 40.0, "{}, {size}: {shown:?}", situation.0);
         }
     }
 }

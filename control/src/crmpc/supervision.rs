@@ -7,8 +7,11 @@
 use serde::{Deserialize, Serialize};
 use settings::{Choice, Declared};
 
-/// Time without contradiction after which the assumptions are trusted again, s.
+/// Time without contradiction after which the assumptions are trusted again, s: those on inputs that
+/// the law is told, and those that measurements contradict, which a lasting fault need not do at
+/// every tick.
 const PROBATION: f64 = 1.0;
+const PROBATION_OF_MEASUREMENTS: f64 = 3.0;
 
 /// Status of the guarantee of the robust set at the last tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
@@ -24,7 +27,8 @@ pub enum GuaranteeStatus {
     Refused,
     /// No plan was found that satisfies the conditions of the guarantee.
     Uncertified,
-    /// An assumption was contradicted within the last second; guarantee.contradiction shows which.
+    /// An assumption was contradicted within the last second, or by measurements within the last
+    /// three; guarantee.contradiction shows which.
     Exceeded,
     /// a tick within the last second used inputs that had been set before it; step with
     /// period.feedback or a whole fraction of it.
@@ -37,7 +41,7 @@ impl GuaranteeStatus {
     }
 }
 
-/// Contradiction of an assumption of the guarantee within the last second.
+/// Contradiction of an assumption of the guarantee, until the assumption is trusted again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 pub enum Contradiction {
     /// No contradiction.
@@ -74,7 +78,7 @@ pub enum Contradiction {
 pub struct Supervision {
     /// Status of the guarantee of the robust set at the last tick.
     pub status: GuaranteeStatus,
-    /// Contradiction of an assumption of the guarantee within the last second.
+    /// Contradiction of an assumption of the guarantee, until the assumption is trusted again.
     pub contradiction: Contradiction,
     /// Ticks left until the assumptions are trusted again.
     #[setting(skip)]
@@ -101,7 +105,14 @@ impl Supervision {
             }
         } else {
             self.contradiction = contradiction;
-            self.probation = (PROBATION / period).ceil() as u32;
+            let probation = match contradiction {
+                Contradiction::Step
+                | Contradiction::KnownMoment
+                | Contradiction::Turn
+                | Contradiction::Schedule => PROBATION,
+                _ => PROBATION_OF_MEASUREMENTS,
+            };
+            self.probation = self.probation.max((probation / period).ceil() as u32);
         }
         self.status = match (plan, self.contradiction) {
             (GuaranteeStatus::None | GuaranteeStatus::Refused, _) | (_, Contradiction::None) => {
@@ -119,7 +130,7 @@ mod tests {
     use super::{Contradiction, GuaranteeStatus, Supervision};
 
     #[test]
-    fn trust_returns_a_second_after_the_last_contradiction() {
+    fn trust_returns_seconds_after_the_last_contradiction() {
         let mut supervision = Supervision::default();
         let mut judge = |contradiction| {
             supervision.judge(GuaranteeStatus::InForce, contradiction, 0.04);
@@ -129,7 +140,7 @@ mod tests {
         for _ in 0..3 {
             assert_eq!(judge(Contradiction::Motion), GuaranteeStatus::Exceeded);
         }
-        for _ in 1..25 {
+        for _ in 1..75 {
             assert_eq!(judge(Contradiction::None), GuaranteeStatus::Exceeded);
         }
         assert_eq!(judge(Contradiction::None), GuaranteeStatus::InForce);
