@@ -70,6 +70,16 @@ def test_oracle_the_results_are_those_of_fmi_2(experiment, folders, tmp_path):
     assert jacobi[0] == jacobi[1] != expected
 
 
+@pytest.mark.parametrize("coupling", ["sequential", "jacobi"])
+@pytest.mark.parametrize("step", ["0.01", "0.03", "0.06", "0.08", "0.1", "0.4"])
+def test_oracle_a_step_of_any_length_gives_the_results_of_fmi_2(step, coupling, folders, tmp_path):
+    """A tick within a step sees the inputs of its beginning, whether or not the step is cut there."""
+    options = ["--step", step, "--coupling", coupling, "--stop", "2.4"]
+    expected = rows(tmp_path / "two", "crmpc-2022/crmpc-robust", TARGET / "fmu", options=options)
+    for name in ("FMI 3.0", "without event mode"):
+        assert rows(tmp_path / "three", "crmpc-2022/crmpc-robust", folders[name], options=options) == expected, name
+
+
 def test_oracle_linear_models_are_those_of_fmi_2(tmp_path):
     found = []
     for folder in ("fmu", "fmi3"):

@@ -181,12 +181,17 @@ impl<I: SampledInstance> Model for SampledFmu<I> {
     }
 
     /// A due tick is evaluated, except after a step: the outputs are then those of the tick that
-    /// was committed, which acted over that step.
+    /// was committed, which acted over that step. Within a step of the importer its inputs are
+    /// stale.
     fn calculate(&mut self, time: f64, last: LastEvent) -> Result<(), Failure> {
         let (instance, device, ticks) = self.parts()?;
         let holds = last == LastEvent::Step && ticks.has_committed();
         if !holds && ticks.is_due(time) {
-            instance.evaluate(device, ticks)?;
+            if last == LastEvent::Event {
+                instance.evaluate_stale(device, ticks)?;
+            } else {
+                instance.evaluate(device, ticks)?;
+            }
         }
         if let (Some(device), Some(ticks)) = (&self.device, &self.ticks) {
             let (output, memory) = ticks.in_force();
@@ -212,7 +217,8 @@ impl<I: SampledInstance> Model for SampledFmu<I> {
             let Some(tick) = ticks.next_before(to) else { return Ok(()) };
             inputs.advance(self, tick.max(from));
             let (instance, device, ticks) = self.parts()?;
-            if ticks.is_due(from) || inputs.are_extrapolated() {
+            let are_current = ticks.is_due(from) && inputs.are_current();
+            if are_current || inputs.are_extrapolated() {
                 instance.evaluate(device, ticks)?;
             } else {
                 instance.evaluate_stale(device, ticks)?;

@@ -54,6 +54,12 @@ pub trait Inputs<M> {
     /// Returns whether the importer gave derivatives, so that the inputs move during the step.
     fn are_extrapolated(&self) -> bool;
 
+    /// Returns whether the inputs are those of the beginning of the step. A step that an event of
+    /// FMI 3.0 has cut begins with those of an earlier instant.
+    fn are_current(&self) -> bool {
+        true
+    }
+
     /// Integrates the states of the model from `from` to `to` (both s) by the Runge–Kutta method of
     /// fourth order, in equal steps no longer than that of the default experiment.
     ///
@@ -74,8 +80,12 @@ pub enum LastEvent {
     /// A step has been made, and no input was set since. The outputs are those that held over this
     /// step.
     Step,
-    /// An input was set by a call, whatever its value, an event of FMI 3.0 was handled, or the
-    /// instance runs in model exchange. The outputs respond to the inputs.
+    /// An event of FMI 3.0 was handled within a step of the importer, which has set no input since
+    /// its beginning. The outputs respond to inputs of an earlier instant.
+    Event,
+    /// An input was set by a call, whatever its value, an event of FMI 3.0 was handled by an
+    /// importer that sets no inputs at all, or the instance runs in model exchange. The outputs
+    /// respond to the inputs.
     InputSet,
 }
 

@@ -27,10 +27,10 @@ pub(crate) trait ModelInstance: Send {
     fn reset(&mut self, failed: bool);
     fn initialize(&mut self, context: &Context) -> Result<(), Failure>;
     fn calculate(&mut self, time: f64, last: LastEvent) -> Result<(), Failure>;
-    /// Performs a step and leaves the inputs at their values at `to`.
+    /// Performs a step after this event, and leaves the inputs at their values at `to`.
     fn step(
         &mut self,
-        from: f64,
+        begin: (f64, LastEvent),
         to: f64,
         inputs: &[Extrapolation],
         log: &mut dyn FnMut(&str),
@@ -79,6 +79,8 @@ struct Extrapolated<'a, M> {
     longest: f64,
     scratch: RefCell<&'a mut Scratch>,
     from: f64,
+    /// Event before the step.
+    last: LastEvent,
     inputs: &'a [Extrapolation],
 }
 
@@ -132,6 +134,10 @@ impl<M: Model> Inputs<M> for Extrapolated<'_, M> {
 
     fn are_extrapolated(&self) -> bool {
         !self.inputs.is_empty()
+    }
+
+    fn are_current(&self) -> bool {
+        self.last != LastEvent::Event
     }
 
     fn integrate(&self, model: &mut M, from: f64, to: f64) -> Result<(), Failure> {
@@ -193,14 +199,14 @@ impl<M: Model> ModelInstance for Bound<M> {
 
     fn step(
         &mut self,
-        from: f64,
+        (from, last): (f64, LastEvent),
         to: f64,
         inputs: &[Extrapolation],
         log: &mut dyn FnMut(&str),
     ) -> Result<(), Failure> {
         let Self { model, table, states, longest, scratch } = self;
         let (longest, scratch) = (*longest, RefCell::new(scratch));
-        let inputs = Extrapolated { table, states, longest, scratch, from, inputs };
+        let inputs = Extrapolated { table, states, longest, scratch, from, last, inputs };
         model.step(from, to, &inputs, log)?;
         inputs.advance(model, to);
         Ok(())

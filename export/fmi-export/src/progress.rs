@@ -42,6 +42,8 @@ pub(crate) struct Progress {
     pub(crate) initialized: bool,
     /// Last step of co-simulation, or input that was set after it.
     pub(crate) last_event: LastEvent,
+    /// Whether the importer has set an input since initialization.
+    pub(crate) sets_inputs: bool,
     pub(crate) extrapolations: Vec<Extrapolation>,
 }
 
@@ -54,6 +56,7 @@ impl Default for Progress {
             stop_time: None,
             initialized: false,
             last_event: LastEvent::default(),
+            sets_inputs: false,
             extrapolations: Vec::new(),
         }
     }

@@ -143,7 +143,8 @@ impl Instance {
         }
         let logger = &mut self.logger;
         let mut log = |text: &str| logger.log(Category::Warning, text);
-        match self.model.step(from, to, &self.progress.extrapolations, &mut log) {
+        let begin = (from, self.progress.last_event);
+        match self.model.step(begin, to, &self.progress.extrapolations, &mut log) {
             Ok(()) => {
                 if to > from {
                     self.progress.last_event = LastEvent::Step;

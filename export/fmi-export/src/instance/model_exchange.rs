@@ -36,7 +36,10 @@ impl Instance {
     pub(crate) fn new_discrete_states(&mut self) -> Result<EventInfo, Failure> {
         if self.interface == Interface::CoSimulation {
             if self.progress.last_event == LastEvent::Step {
-                self.note_input();
+                let sets_inputs = self.progress.sets_inputs;
+                self.stale = true;
+                self.progress.last_event =
+                    if sets_inputs { LastEvent::Event } else { LastEvent::InputSet };
             }
             self.refresh()?;
             let next_event_time = self.next_event()?;

@@ -105,6 +105,7 @@ impl Instance {
     /// Notes that an input was set, so that the outputs respond to the inputs.
     pub(super) fn note_input(&mut self) {
         self.stale |= self.progress.last_event != LastEvent::InputSet;
+        self.progress.sets_inputs = true;
         self.progress.last_event = LastEvent::InputSet;
     }
 

@@ -29,11 +29,12 @@ impl Unit {
     pub(super) fn scaling(from: Option<&Self>, to: Option<&Self>) -> Result<Scaling, String> {
         let (Some(from), Some(to)) = (from, to) else { return Ok(Scaling::default()) };
         let (name, target) = (Some(from.name.as_str()), Some(to.name.as_str()));
-        if from.units.iter().any(|unit| unit.name == from.name) {
+        let scaling = if from.units.iter().any(|unit| unit.name == from.name) {
             quantity::conversion(name, &from.units, target, &to.units)
         } else {
             quantity::named(name, target, &to.units)
-        }
+        };
+        scaling.map_err(|units| format!("{units} cannot be converted: they measure different quantities, or one is not defined"))
     }
 }
 
