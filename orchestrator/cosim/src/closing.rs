@@ -77,7 +77,7 @@ impl System {
             }
             _ => {
                 let component = component.unwrap_or_else(|| "an FMU".into());
-                interrupt.or(Error::Call { component, time, failure })
+                Error::Call { component, time, failure }.or(interrupt.asked())
             }
         }
     }

@@ -100,6 +100,15 @@ impl From<Failed> for Error {
 }
 
 impl Error {
+    /// Returns the request to end the work, if there was one, in place of the failure of a call: it
+    /// may have ended that call.
+    pub(crate) fn or(self, request: Option<Request>) -> Self {
+        match (self, request) {
+            (Self::Call { time, .. }, Some(request)) => Self::Interrupted { time, request },
+            (failed, _) => failed,
+        }
+    }
+
     /// Creates an error of the experiment that refers to no line.
     pub fn experiment(message: impl Into<String>) -> Self {
         Self::Experiment { at: String::new(), message: message.into() }

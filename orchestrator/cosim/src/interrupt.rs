@@ -1,7 +1,6 @@
 //! Requests from outside to end the work. The results so far are kept, and temporary files are
 //! removed.
 
-use crate::error::Error;
 use serde::{Deserialize, Serialize};
 #[cfg(unix)]
 use signal_hook::flag;
@@ -117,15 +116,6 @@ impl Interrupt {
     /// Lets requests end steps of this thread's instances, too.
     pub(crate) fn watch(&self) {
         fmu_import::halt::watch(&self.signal);
-    }
-
-    /// Returns the request, if there was one, in place of the failure of a call: it may have ended
-    /// that call.
-    pub(crate) fn or(&self, failed: Error) -> Error {
-        match (failed, self.asked()) {
-            (Error::Call { time, .. }, Some(request)) => Error::Interrupted { time, request },
-            (failed, _) => failed,
-        }
     }
 
     /// Records a request to end the work.

@@ -100,7 +100,7 @@ impl Run {
     /// Returns an error if an instance fails, or if the run was ended from outside.
     pub fn advance(&mut self, tick: u64) -> Result<&[f64], Error> {
         begin(self.master.clock().time(tick), &self.interrupt)?;
-        self.master.advance(tick).map_err(|failed| self.interrupt.or(failed.into()))
+        self.master.advance(tick).map_err(|failed| Error::from(failed).or(self.interrupt.asked()))
     }
 }
 
@@ -142,7 +142,7 @@ impl Watcher for Watch<'_, '_> {
         for observer in self.observers.iter_mut() {
             observer.observe(sample)?;
         }
-        outcome.map_err(|failed| self.interrupt.or(failed.into()))?;
+        outcome.map_err(|failed| Error::from(failed).or(self.interrupt.asked()))?;
         deadlines
     }
 }
