@@ -272,12 +272,6 @@ fn any_reference_keeps_a_plan() {
 }
 
 #[test]
-#[ignore = "minutes: for the figures of docs/proof.md"]
-fn a_thousand_jumps_beyond_the_sideslip_of_the_guarantee_are_followed_as_far_as_possible() {
-    println!("most iterations: {}", check(Jump::beyond, HELD_OUT, 1000));
-}
-
-#[test]
 #[ignore = "a minute: for the figures of docs/proof.md"]
 fn a_thousand_jumps_are_followed_under_guarantee() {
     println!("most iterations: {}", check(Jump::random, SEED, 1000).max(reversal().check()));
