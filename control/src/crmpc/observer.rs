@@ -42,7 +42,7 @@ impl Observed {
     ) {
         self.is_contradicted = false;
         let Some([angles, before, commanded]) = self.last else {
-            self.by_moment = by_known().abs();
+            self.by_moment = self.by_moment.sup(&by_known().abs());
             return;
         };
         let residual = (rates - before) / s.period_feedback - commanded;
@@ -63,9 +63,13 @@ impl Observed {
         observable.is_finite() && !self.is_contradicted
     }
 
-    /// Stores angles, rates and commanded acceleration for the next tick.
-    pub(super) fn remember(&mut self, last: [Vector3<f64>; 3]) {
-        self.last = Some(last);
+    /// Stores angles, rates and commanded acceleration for the next tick; `None` if they are not
+    /// those of the tick, so that nothing can be observed from there on.
+    pub(super) fn remember(&mut self, last: Option<[Vector3<f64>; 3]>) {
+        self.last = last;
+        if last.is_none() {
+            (self.excess, self.is_contradicted) = (Excess::default(), false);
+        }
     }
 
     /// Replaces the stored command by the acceleration that `applied` (N m) gives.

@@ -72,7 +72,8 @@ impl Robust {
         if memory.guarantee == GuaranteeStatus::Pending && memory.pending == 0 {
             memory.guarantee = GuaranteeStatus::InForce;
         }
-        memory.observed.remember([measured.angles, tick.angle_rates, *commanded]);
+        let last = [measured.angles, tick.angle_rates, *commanded];
+        memory.observed.remember((!measured.stale).then_some(last));
         let period = self.settings.period_feedback;
         memory.supervision.judge(memory.guarantee, contradiction, period);
     }

@@ -64,7 +64,10 @@ impl Robust {
         memory.recent_bound = self.recent_bound(memory);
         memory.acting.ticks = memory.acting.ticks.saturating_sub(1);
         let Self { settings, design, .. } = self;
-        let Measurement { angles, known_moment, .. } = tick.measured;
+        let Measurement { angles, known_moment, stale, .. } = tick.measured;
+        if *stale {
+            return memory.observed.remember(None);
+        }
         memory.observed.observe(settings, &design.tightening.observable, &tick.angle_rates, || {
             kinematics::r(angles) * settings.body.inverse * known_moment
         });
