@@ -44,8 +44,8 @@ def settings(attitude, delay: float, scale: float = 1.0, start: float = 0.0) -> 
     """Arguments for a loop at rest at this attitude, with the actual inertia in relation to the nominal one."""
     values = {
         "controller.reference.profile": "constant",
-        "controller.inertia.Izz": INERTIA[2, 2],
-        "plant.inertia.Izz": INERTIA[2, 2],
+        "controller.vehicle.file": "wu2015",
+        "plant.vehicle.file": "wu2015",
         "plant.disturbance.kind": "none",
         "plant.inertia.scale": scale,
         "plant.actuation.delay": delay,

@@ -47,20 +47,28 @@ def refuses(instance: Instance, *words: str):
         ("DLMPC", {"period.feedback": 0.03}, ["period.optimisation", "period.feedback"]),
         ("LQR", {"weight.P[1]": 1e7, "weight.P[4]": 1e7}, ["spectral radius"]),
         ("LQR", {"reference.profile": "table", "reference.file": "nowhere.csv"}, ["nowhere.csv"]),
-        ("CRMPC", {"inertia.Ixz": 1e6}, ["inertia.Ixz"]),
-        ("ReentryPlant", {"inertia.Iyy": 1e3}, ["inertia.Iyy"]),
+        ("CRMPC", {"vehicle.file": "no-such"}, ["vehicle.file: no-such"]),
+        ("ReentryPlant", {"inertia.ratio.Iyy": 7.0}, ["inertia.Iyy"]),
         ("ControlAllocator", {"period": 0.0105}, ["period", "pwpf.period"]),
         ("ControlAllocator", {"pwpf.on": 5.0}, ["pwpf.on"]),
         ("ControlAllocator", {"weight.moment[2]": 0.0}, ["weight.moment[2]"]),
-        ("AttitudeEstimator", {"filter.cutoff": 50.0}, ["filter.cutoff"]),
-        ("AttitudeEstimator", {"lost.after": 0.0}, ["lost.after"]),
-        ("EntryGuidance", {"shaping.bankRate": 0.0}, ["shaping.bankRate"]),
-        ("EntryNavigation", {"fix.gate": 1.0}, ["fix.gate"]),
+        ("AttitudeEstimator", {"settings.file": "filter.cutoff = 50.0"}, ["filter.cutoff"]),
+        ("AttitudeEstimator", {"settings.file": "lost.after = 0.0"}, ["lost.after"]),
+        ("EntryGuidance", {"settings.file": "shaping.bankRate = 0.0"}, ["shaping.bankRate"]),
+        ("EntryGuidance", {"settings.file": "shaping.bank = 1.0"}, ["settings.file", "shaping.bank: there is no such setting"]),
+        ("EntryGuidance", {"settings.file": "limit.load = 1.0"}, ["limit.load is a variable"]),
+        ("EntryNavigation", {"settings.file": "fix.gate = 1.0"}, ["fix.gate"]),
+        ("EntryNavigation", {"settings.file": "fix.gate ="}, ["settings.file", "line 1"]),
+        ("ReentryPlant", {"sensor.set": 2, "settings.file": "sensor.gyroscope.noise = -1"}, ["sensor.gyroscope.noise"]),
         ("ReentryPlant", {"translation": "entry", "initial.altitude": 10e3}, ["initial.altitude", "end.altitude"]),
         ("ReentryPlant", {"translation": "entry", "air.rows": 2}, ["air.altitude[2]"]),
     ],
 )
-def test_designs_that_cannot_work_are_refused_at_initialization(fmu, name, settings, words):
+def test_designs_that_cannot_work_are_refused_at_initialization(fmu, name, settings, words, tmp_path):
+    if text := settings.get("settings.file"):
+        file = tmp_path / "settings.toml"
+        file.write_text(text)
+        settings = settings | {"settings.file": str(file)}
     with Instance(fmu(name), settings) as instance:
         with refuses(instance, *words):
             instance.start()

@@ -13,7 +13,7 @@ from fmi import ANGLES, MOMENT, RATES, Instance
 TVSMC = ROOT / "orchestrator" / "experiments" / "tvsmc-2015"
 DEG = np.pi / 180.0
 INERTIA = np.array([[588791.0, 0.0, -24242.0], [0.0, 1303212.0, 0.0], [-24242.0, 0.0, 1534164.0]])
-BODY = {"inertia.Ixx": 588791.0, "inertia.Iyy": 1303212.0, "inertia.Izz": 1534164.0, "inertia.Ixz": 24242.0}
+BODY = {"vehicle.file": "wu2015"}
 START = dict(zip(ANGLES + RATES, [32 * DEG, 2 * DEG, 58 * DEG, 0.0, 0.0, 0.0]))
 
 

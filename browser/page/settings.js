@@ -62,7 +62,7 @@ const ENTRY = [
 ];
 // Tuned parameters of a law; the rest is folded away.
 const GAINS = /^(weight|feedback|terminal|gain|surface|reaching|boundaryLayer|slidingMode|inner|outer|observer|commandFilter)\.|^disturbance\.bound$/;
-const HIDDEN = /^(period|trajectory|calibration|solver\.timeBudget)|^reference\.file$/;
+const HIDDEN = /^(period|trajectory|solver\.timeBudget)|^(reference|settings)\.file$/;
 // Units that read better: factor and name.
 const READABLE = { "N.m": [1e-3, "kN m"], "W/m2": [1e-3, "kW/m²"], Pa: [1e-3, "kPa"] };
 

@@ -2,6 +2,10 @@
 //! selector of Jia et al.
 
 use crate::harness::flight::Random;
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::SupportedConeT::{NonnegativeConeT, ZeroConeT};
+use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver};
+use control::allocation::attainable::{Ball, Reach, largest_ball};
 use control::allocation::pwpf::{Modulator, Pwpf};
 use control::allocation::{
     AllocationStatus, Allocator, Command, JetCommand, Memory, Method, Settings,
@@ -304,7 +308,7 @@ fn settings_that_cannot_work_are_refused_by_name() {
             .err()
             .map_or_else(String::new, |error: DesignError| error.to_string())
     };
-    let cases: [(Change, &str); 9] = [
+    let cases: [(Change, &str); 7] = [
         (&|s| s.period = 0.0, "period"),
         (&|s| s.period = 0.0105, "pwpf.period"),
         (&|s| s.weight_moment.y = 0.0, "weight.moment[2]"),
@@ -312,11 +316,97 @@ fn settings_that_cannot_work_are_refused_by_name() {
         (&|s| s.weight_surface = f64::NAN, "weight.surface"),
         (&|s| s.pwpf.off = 0.45, "pwpf.off"),
         (&|s| s.pwpf.on = 4.5, "pwpf.on"),
-        (&|s| s.effectors.min[2] = 0.1, "limit.surfaceMin[3]"),
-        (&|s| s.effectors.jet_moments[(0, 0)] = f64::NAN, "jetMoment"),
     ];
     for (change, name) in cases {
         let text = refusal(change);
         assert!(text.contains(name), "{name}: {text}");
     }
+}
+
+/// Largest multiple of a moment that effectors can give, by a linear program in their commands.
+fn reach_along(effectors: &[Reach], offset: &Vector3<f64>, direction: &Vector3<f64>) -> f64 {
+    const SCALE: f64 = 1e4;
+    let count = effectors.len();
+    // The unknowns are the multiple and the commands; rows are the moment's axes, then both limits.
+    let mut entries = vec![(0, 0, -direction.x), (1, 0, -direction.y), (2, 0, -direction.z)];
+    let mut right_side: Vec<f64> = (-offset / SCALE).iter().copied().collect();
+    for (j, (column, low, high)) in effectors.iter().enumerate() {
+        entries.extend((0..3).map(|i| (i, 1 + j, column[i] / SCALE)));
+        entries.extend([(3 + 2 * j, 1 + j, 1.0), (4 + 2 * j, 1 + j, -1.0)]);
+        right_side.extend([*high, -low]);
+    }
+    let (rows, (columns, values)): (Vec<_>, (Vec<_>, Vec<_>)) =
+        entries.into_iter().map(|(i, j, value)| (i, (j, value))).unzip();
+    let matrix = CscMatrix::new_from_triplets(3 + 2 * count, 1 + count, rows, columns, values);
+    let cost = CscMatrix::zeros((1 + count, 1 + count));
+    let mut aim = vec![0.0; 1 + count];
+    aim[0] = -1.0;
+    let cones = [ZeroConeT(3), NonnegativeConeT(2 * count)];
+    let tight = 1e-12;
+    let settings = DefaultSettingsBuilder::default()
+        .verbose(false)
+        .tol_gap_abs(tight)
+        .tol_gap_rel(tight)
+        .tol_feas(tight)
+        .build()
+        .unwrap();
+    let mut solver =
+        DefaultSolver::new(&cost, &aim, &matrix, &right_side, &cones, settings).unwrap();
+    solver.solve();
+    solver.solution.x[0] * SCALE
+}
+
+#[test]
+fn oracle_the_largest_ball_is_the_reach_of_a_linear_program_in_its_direction_and_less_in_others() {
+    let mut random = Random::new(3);
+    let printed = Effectors::published();
+    for case in 0..40 {
+        let pressure = if case == 0 { 0.0 } else { random.between(100.0, 2e4) };
+        let matrix = printed.effectiveness_at(pressure);
+        let jets = (0..10).map(|i| (printed.jet_moments.column(i).into_owned(), 0.0, 1.0));
+        let effectors: Vec<Reach> = (0..SURFACES)
+            .map(|i| (matrix.column(i).into_owned(), printed.min[i], printed.max[i]))
+            .filter(|_| case > 0)
+            .chain(jets)
+            .collect();
+        let offset = Vector3::from_fn(|_, _| random.between(-2e3, 2e3)) * f64::from(case % 2);
+        let Ball { radius, axis } = largest_ball(&effectors, &offset);
+        assert!(radius > 1e3 && (axis.norm() - 1.0).abs() < 1e-12, "{case}: {radius}");
+        let reached = reach_along(&effectors, &offset, &axis);
+        assert!((reached - radius).abs() <= 1e-9 * radius, "{case}: {reached} {radius}");
+        for _ in 0..25 {
+            let other = Vector3::from_fn(|_, _| random.between(-1.0, 1.0)).normalize();
+            let reached = reach_along(&effectors, &offset, &other);
+            assert!(reached >= radius * (1.0 - 1e-9), "{case}: {reached} {radius} {other}");
+        }
+    }
+}
+
+#[test]
+fn effectors_that_leave_an_axis_without_moment_attain_no_ball() {
+    let about = |x: f64, y: f64, z: f64| (Vector3::new(x, y, z), -1.0, 1.0);
+    let no_yaw = [about(1.0, 0.0, 0.0), about(0.0, 1.0, 0.0), about(1.0, 1.0, 0.0)];
+    assert_eq!(largest_ball(&no_yaw, &Vector3::zeros()).radius, 0.0);
+    assert_eq!(largest_ball(&no_yaw[..1], &Vector3::zeros()), Ball::default());
+    let box_of_three = [about(2.0, 0.0, 0.0), about(0.0, 3.0, 0.0), about(0.0, 0.0, 5.0)];
+    let ball = largest_ball(&box_of_three, &Vector3::new(0.5, 0.0, 0.0));
+    assert_eq!((ball.radius, ball.axis), (1.5, -Vector3::x()));
+    // A moment that is there and cannot be cancelled leaves none.
+    assert_eq!(largest_ball(&box_of_three, &Vector3::new(0.0, 4.0, 0.0)).radius, 0.0);
+}
+
+#[test]
+fn below_the_threshold_of_blending_jets_alone_attain_moments() {
+    let at = |method: Method, pressure: f64| {
+        settled(&mut allocator(method), 1, &command([1e2, 0.0, 0.0], pressure))
+    };
+    let threshold = Settings::published().threshold;
+    let below = at(Method::Blending, 0.9 * threshold);
+    assert_eq!(below.attainable, at(Method::Optimal, 0.0).attainable);
+    assert_eq!(below.surfaces_alone, 0.0);
+    let [above, twice] = [1.1, 2.2].map(|factor| at(Method::Blending, factor * threshold));
+    assert!(above.attainable.radius > below.attainable.radius);
+    // The surfaces are in proportion to the dynamic pressure, and within a period hardly move.
+    assert!((twice.surfaces_alone / above.surfaces_alone - 2.0).abs() < 1e-12);
+    assert!(above.in_period < above.attainable.radius);
 }

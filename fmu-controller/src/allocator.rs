@@ -28,8 +28,7 @@ pub struct AllocatorInstance {
 impl AllocatorInstance {
     /// Returns the settings with the surfaces and jets that are in force.
     fn in_force(&self) -> Settings {
-        let effectors = self.own.read().and_then(|vehicle| vehicle.effectors.clone());
-        let effectors = effectors.unwrap_or_else(|| self.settings.effectors.clone());
+        let effectors = self.own.vehicle().effectors.clone().unwrap_or_default();
         Settings { effectors, ..self.settings.clone() }
     }
 }
@@ -70,31 +69,13 @@ impl SampledInstance for AllocatorInstance {
         }
     }
 
-    /// Reads the vehicle, whose surfaces and jets take the place of the parameters. A parameter
-    /// that is set as well would be in vain.
     fn load(&mut self, context: &Context) -> Result<(), Failure> {
         self.own.load(context)?;
-        let Some(vehicle) = self.own.read() else { return Ok(()) };
-        if vehicle.effectors.is_none() {
-            let text = "vehicle.file gives neither surfaces nor jets, which the allocator needs";
-            return Err(Failure::Error(text.into()));
+        if self.own.vehicle().effectors.is_some() {
+            return Ok(());
         }
-        let (start, set) = (Settings::published().effectors, &self.settings.effectors);
-        let given = [
-            ("limit.surfaceMin", start.min != set.min),
-            ("limit.surfaceMax", start.max != set.max),
-            ("limit.surfaceRate", start.rate != set.rate),
-            ("surfaceAllowed", start.allowed != set.allowed),
-            ("dynamicPressure.reference", start.reference_pressure != set.reference_pressure),
-            ("surfaceMoment", start.effectiveness != set.effectiveness),
-            ("jetMoment", start.jet_moments != set.jet_moments),
-        ];
-        let given = given.into_iter().find_map(|(name, is_set)| is_set.then_some(name));
-        given.map_or(Ok(()), |name| {
-            Err(Failure::Error(format!(
-                "{name} is set, but vehicle.file gives surfaces and jets: leave {name} at its start value"
-            )))
-        })
+        let text = "vehicle.file gives neither surfaces nor jets, which the allocator needs";
+        Err(Failure::Error(text.into()))
     }
 
     fn design(&self) -> Result<Allocator, Failure> {

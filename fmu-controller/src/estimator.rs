@@ -4,7 +4,7 @@ use control::estimation::{
     Calibration, Estimate, Estimator, Health, Line, Memory, Settings, mems_corrections,
 };
 use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
-use fmi_export::{Description, Failure, VariableTable};
+use fmi_export::{Context, Description, Failure, SettingsFile, VariableTable};
 use model_description::DefaultExperiment;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -29,6 +29,8 @@ pub struct EstimatorInstance {
     output: Output,
     #[setting(name = "")]
     pub(crate) settings: Settings,
+    #[setting(name = "")]
+    pub(crate) file: SettingsFile,
 }
 
 /// Outputs of the estimator.
@@ -79,9 +81,14 @@ impl SampledInstance for EstimatorInstance {
                 corrections: mems_corrections(),
                 ..Settings::ours()
             },
+            file: SettingsFile::default(),
             line: at_rest(),
             output: Output::default(),
         }
+    }
+
+    fn load(&mut self, context: &Context) -> Result<(), Failure> {
+        self.file.clone().read(self, context)
     }
 
     fn design(&self) -> Result<Estimator, Failure> {

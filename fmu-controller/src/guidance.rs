@@ -3,7 +3,7 @@
 use control::guidance::{Command, Guidance, Memory, Navigation, PERIOD, Settings};
 use controller_export::own_vehicle::OwnVehicle;
 use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
-use fmi_export::{Context, Description, Failure, VariableTable};
+use fmi_export::{Context, Description, Failure, SettingsFile, VariableTable};
 use model_description::DefaultExperiment;
 use serde::{Deserialize, Serialize};
 use settings::Declared;
@@ -23,6 +23,8 @@ pub struct GuidanceInstance {
     pub(crate) settings: Settings,
     #[setting(name = "")]
     pub(crate) own: OwnVehicle,
+    #[setting(name = "")]
+    pub(crate) file: SettingsFile,
 }
 
 /// Outputs of the guidance.
@@ -72,12 +74,14 @@ impl SampledInstance for GuidanceInstance {
         Self {
             settings: Settings::default(),
             own: OwnVehicle::default(),
+            file: SettingsFile::default(),
             navigation: Navigation { motion: Start::default().motion(), ..Navigation::default() },
             output: Output::default(),
         }
     }
 
     fn load(&mut self, context: &Context) -> Result<(), Failure> {
+        self.file.clone().read(self, context)?;
         self.own.load(context)
     }
 

@@ -4,7 +4,7 @@
 use control::navigation::{Contradiction, Health, Line, Memory, Navigation, Settings, Shown};
 use controller_export::own_vehicle::OwnVehicle;
 use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
-use fmi_export::{Context, Description, Failure, VariableTable};
+use fmi_export::{Context, Description, Failure, SettingsFile, VariableTable};
 use model_description::DefaultExperiment;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -30,6 +30,8 @@ pub struct NavigationInstance {
     pub(crate) settings: Settings,
     #[setting(name = "")]
     own: OwnVehicle,
+    #[setting(name = "")]
+    pub(crate) file: SettingsFile,
 }
 
 /// Inputs of the navigation, which are outputs of the plant.
@@ -109,6 +111,7 @@ impl SampledInstance for NavigationInstance {
         Self {
             settings: Settings::default(),
             own: OwnVehicle::default(),
+            file: SettingsFile::default(),
             // The air at the start of the flight, so that the navigation moves without a plant.
             input: Input { force: Vector3::new(0.0, 0.0, -1e-3), ..Input::default() },
             shown: Shown::default(),
@@ -118,6 +121,7 @@ impl SampledInstance for NavigationInstance {
     }
 
     fn load(&mut self, context: &Context) -> Result<(), Failure> {
+        self.file.clone().read(self, context)?;
         self.own.load(context)
     }
 

@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 use settings::{Choice, Declared};
-use vehicle::aerodynamics::Aerodynamics;
 use vehicle::air::Air;
 use vehicle::entry::{Config, Deviations, End, Following, Start, Trim};
 use vehicle::translation::Planet;
@@ -18,21 +17,11 @@ pub(crate) enum Translation {
     Entry,
 }
 
-/// Data of the air's forces and moments.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
-pub(crate) enum Vehicle {
-    /// The vehicle of the papers: representative forces and moments; or that of vehicle.file.
-    #[default]
-    Papers,
-    /// The Space Shuttle of Betts: forces and heating, no moments.
-    Shuttle,
-}
-
 /// File of the vehicle.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub(crate) struct VehicleFile {
-    /// Path of a TOML file with the vehicle, or name of a file in the resources of the FMU; empty
-    /// for a built-in vehicle.
+    /// Path of a TOML file with the vehicle, or name of a file in the resources of the FMU, or a
+    /// shipped vehicle: chai2022 (also if empty), wu2015, jia, shuttle.
     #[setting(name = "vehicle.file")]
     pub(crate) file: String,
 }
@@ -46,11 +35,8 @@ pub(crate) struct EntryParameters {
     pub(crate) start: Start,
     #[setting(used_with = "translation = entry")]
     pub(crate) planet: Planet,
-    #[setting(name = "aerodynamics.vehicle")]
-    #[setting(used_with = "translation = entry")]
-    pub(crate) vehicle: Vehicle,
     #[setting(name = "aerodynamics.trim")]
-    #[setting(used_with = "translation = entry and aerodynamics.vehicle = papers")]
+    #[setting(used_with = "translation = entry")]
     pub(crate) trim: Trim,
     #[setting(name = "aerodynamics")]
     #[setting(used_with = "translation = entry")]
@@ -71,7 +57,6 @@ impl Default for EntryParameters {
             translation: Translation::default(),
             start: Start::default(),
             planet: Planet::EARTH,
-            vehicle: Vehicle::default(),
             trim: Trim::default(),
             deviations: Deviations::default(),
             air: Air::default(),
@@ -91,14 +76,9 @@ impl EntryParameters {
     /// Returns the configuration of the entry flight of a vehicle, with a factor on the density of
     /// the air, or `None` without one.
     pub(crate) fn config(&self, density_scale: f64, vehicle: &vehicle::Vehicle) -> Option<Config> {
-        let aerodynamics = match (self.translation, self.vehicle) {
-            (Translation::Given, _) => return None,
-            (Translation::Entry, Vehicle::Papers) => vehicle.aerodynamics.clone(),
-            (Translation::Entry, Vehicle::Shuttle) => Aerodynamics::shuttle(),
-        };
-        Some(Config {
+        self.is_entry().then(|| Config {
             planet: self.planet,
-            aerodynamics,
+            aerodynamics: vehicle.aerodynamics.clone(),
             deviations: self.deviations,
             air: Air { scale: density_scale, ..self.air },
             trim: self.trim,

@@ -57,6 +57,7 @@ impl Model for ReentryPlant {
 
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
         let failed = |error: vehicle::Error| Failure::Error(error.to_string());
+        self.parameters.settings.clone().read(&mut self.parameters, context)?;
         self.fixed = self.parameters.fixed().map_err(failed)?.0;
         self.vehicle = self.parameters.load_vehicle(context)?;
         let config = self.parameters.config(self.vehicle.as_deref()).map_err(failed)?;

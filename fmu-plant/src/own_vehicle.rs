@@ -1,17 +1,9 @@
 //! The vehicle that a file gives in place of the built-in ones.
 
-use crate::entry;
 use crate::parameters::{Actuation, Parameters};
 use crate::plant::ReentryPlant;
 use fmi_export::{Context, Failure};
 use vehicle::Vehicle;
-
-/// Returns the error for a parameter that the file leaves without effect.
-fn twice(name: &str, what: &str) -> Failure {
-    Failure::Error(format!(
-        "{name} is set, but vehicle.file gives {what}: leave {name} at its start value, or {what} out of the file"
-    ))
-}
 
 impl Parameters {
     /// Reads the vehicle from the file that the parameters name, if they name one.
@@ -21,22 +13,6 @@ impl Parameters {
         }
         let vehicle = Vehicle::read(&context.file(&self.vehicle.file))
             .map_err(|error| Failure::Error(format!("vehicle.file: {error}")))?;
-        if self.entry.vehicle != entry::Vehicle::default() {
-            return Err(twice("aerodynamics.vehicle", "the vehicle"));
-        }
-        if vehicle.inertia.is_some() {
-            let (set, start) = (self.inertia, Self::default().inertia);
-            for (name, set, start) in [
-                ("inertia.Ixx", set.Ixx, start.Ixx),
-                ("inertia.Iyy", set.Iyy, start.Iyy),
-                ("inertia.Izz", set.Izz, start.Izz),
-                ("inertia.Ixz", set.Ixz, start.Ixz),
-            ] {
-                if set != start {
-                    return Err(twice(name, "the inertia"));
-                }
-            }
-        }
         if self.actuation == Actuation::SurfacesAndJets && vehicle.effectors.is_none() {
             let text = "vehicle.file gives neither surfaces nor jets, which actuation = surfacesAndJets needs";
             return Err(Failure::Error(text.into()));

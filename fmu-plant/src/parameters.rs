@@ -2,6 +2,7 @@
 
 use crate::entry::{EntryParameters, VehicleFile};
 use crate::sensing::{NEVER, Sensing};
+use fmi_export::SettingsFile;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::{Choice, Declared};
@@ -38,9 +39,10 @@ pub(crate) enum Actuation {
 /// Parameters that a user sets before the simulation, in the order of the variable table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub(crate) struct Parameters {
-    /// Nominal inertia.
-    pub(crate) inertia: Inertia,
-    /// Ratio of the actual to the nominal inertia: 1.05 means 5 % more.
+    /// Ratio of the actual {} of the inertia to that of the vehicle.
+    #[setting(name = "inertia.ratio", each = INERTIA, min = 0.0, max = 10.0, nominal = 1.0)]
+    pub(crate) inertia_ratios: [f64; 4],
+    /// Ratio of the actual to the nominal inertia besides inertia.ratio: 1.05 means 5 % more.
     #[setting(name = "inertia.scale", min = 0.01, max = 100.0, nominal = 1.0)]
     pub(crate) inertia_scale: f64,
     pub(crate) initial: Initial,
@@ -123,7 +125,17 @@ pub(crate) struct Parameters {
     pub(crate) entry: EntryParameters,
     #[setting(name = "")]
     pub(crate) vehicle: VehicleFile,
+    #[setting(name = "")]
+    pub(crate) settings: SettingsFile,
 }
+
+/// Names of the entries of the inertia.
+const INERTIA: [Entry; 4] = [
+    (".Ixx", "roll moment"),
+    (".Iyy", "pitch moment"),
+    (".Izz", "yaw moment"),
+    (".Ixz", "product of the roll and yaw axes"),
+];
 
 /// Names of the two sinusoids of the disturbance moment.
 const WAVES: [Entry; 2] = [(".first", "first"), (".second", "second")];
@@ -200,7 +212,7 @@ impl Default for Parameters {
             scenario.disturbance;
         let wave = |i: usize| sine.waves.get(i).copied().unwrap_or_default();
         Self {
-            inertia: scenario.inertia,
+            inertia_ratios: [1.0; 4],
             inertia_scale: scenario.inertia_scale,
             initial: Initial::new(scenario.initial_angles, scenario.initial_rates),
             kind,
@@ -227,6 +239,7 @@ impl Default for Parameters {
             table: Table::default(),
             entry: EntryParameters::default(),
             vehicle: VehicleFile::default(),
+            settings: SettingsFile::default(),
         }
     }
 }
@@ -290,10 +303,13 @@ impl Parameters {
     ///
     /// # Errors
     /// Names the parameter that is out of range.
+    #[allow(non_snake_case)]
     pub(crate) fn config(&self, file: Option<&Vehicle>) -> Result<Config, Error> {
         let vehicle = file.unwrap_or_else(|| Vehicle::papers());
+        let Inertia { Ixx, Iyy, Izz, Ixz } = vehicle.inertia;
+        let [xx, yy, zz, xz] = self.inertia_ratios;
         Ok(Config {
-            inertia: vehicle.inertia.unwrap_or(self.inertia),
+            inertia: Inertia { Ixx: Ixx * xx, Iyy: Iyy * yy, Izz: Izz * zz, Ixz: Ixz * xz },
             inertia_scale: self.inertia_scale,
             initial: state(&self.initial.angles(), &self.initial.rates),
             disturbance: Disturbance {
@@ -315,7 +331,6 @@ impl Parameters {
             actuators: self.actuators(vehicle)?,
             moment_delay: self.converter.delay,
             moment_resolution: self.converter.resolution,
-            calibration: self.sensing.calibrates.then_some(self.sensing.sequence),
             surroundings: self.sensing.surroundings,
             sensors: self.sensing.sensors(),
             turntable: self.sensing.turntable,

@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 use settings::Declared;
-use vehicle::calibration::Sequence;
 use vehicle::fixes::Devices;
 use vehicle::platform::Surroundings;
 use vehicle::sensor_data::{LAST_SENSORS, SensorData};
@@ -43,12 +42,6 @@ pub(crate) struct Sensing {
     pub(crate) triads: PerSensor<Triad>,
     #[setting(name = "sensor")]
     pub(crate) surroundings: Surroundings,
-    /// If true, the attitude follows a prescribed calibration sequence instead of the dynamics.
-    #[setting(name = "calibration.active")]
-    pub(crate) calibrates: bool,
-    #[setting(name = "calibration")]
-    #[setting(used_with = "calibration.active = true")]
-    pub(crate) sequence: Sequence,
     pub(crate) turntable: turntable::Config,
 }
 
@@ -64,8 +57,6 @@ impl Default for Sensing {
             devices: Devices::default(),
             triads: sensors.mems,
             surroundings: sensors.surroundings,
-            calibrates: false,
-            sequence: sensors.calibration,
             turntable: turntable::Config::default(),
         }
     }

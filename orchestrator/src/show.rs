@@ -8,7 +8,8 @@ use std::io::Write;
 use std::path::Path;
 use study::definition::Study;
 
-/// Prints an experiment, a study or a campaign with everything that it extends.
+/// Prints an experiment, a study or a campaign with everything that it extends. The files that an
+/// experiment or a campaign names have their absolute paths.
 ///
 /// # Errors
 /// Returns an error if there is no such file, if it is faulty, or if the text cannot be written.
@@ -16,8 +17,8 @@ pub(crate) fn show(name: &Path, out: &mut impl Write) -> Result<(), Failure> {
     let path = find_any(name, &[Kind::Study, Kind::Experiment, Kind::Campaign])?;
     let text = match Kind::of(&path) {
         Some(Kind::Study) => Study::spelled_out(&path)?,
-        Some(Kind::Campaign) => Campaign::load(&path)?.source.whole().to_string(),
-        _ => Experiment::load(&path)?.source.whole().to_string(),
+        Some(Kind::Campaign) => Campaign::load(&path)?.source.movable(),
+        _ => Experiment::load(&path)?.source.movable(),
     };
     Ok(out.write_all(text.as_bytes())?)
 }

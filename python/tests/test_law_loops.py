@@ -67,8 +67,7 @@ def entry(tmp_path):
     ],
 )
 def test_oracle_a_law_flies_every_loop_as_its_fmu(name, changes, stop, within):
-    inertia = {"Ixx": 588791.0, "Iyy": 1303212.0, "Izz": 1534163.0, "Ixz": 24242.0}
-    changes |= {f"controller.inertia.{key}": value for key, value in inertia.items()}
+    changes |= {"controller.vehicle.file": "chai2022"}
     by_law = experiment(name, set=changes, stop=stop, law=lqr)
     by_fmu = experiment(name, set=changes, stop=stop, fmu={"controller": "LQR"})
     assert np.abs(by_law.table[ANGLES].to_numpy() - by_fmu.table[ANGLES].to_numpy()).max() < within

@@ -9,19 +9,14 @@ SCENES = {
         "settings without guarantee": ("crmpc-2022/crmpc-robust", {"disturbance.bound": 0.2}),
         "limits that are scheduled": ("crmpc-2022/crmpc-robust", {"scheduled.limitMoment": 1.3e5, "scheduled.disturbanceBound": 0.01, "scheduled.disturbanceParts": 2}),
     },
-    "ControlAllocator": {
-        "surfaces that are all used": ("exchange/crmpc-2022-allocated", {f"surfaceAllowed[{k}]": True for k in (7, 8)} | {f"surfaceMoment[{axis},{k}]": 2e4 * (k - 7.5) * axis for k in (7, 8) for axis in (1, 2, 3)}),
-    },
     "EntryGuidance": {"limits that are reached": (TURNING[0], {"limit.heatFlux": 3e5, "limit.load": 1.15, "limit.pressure": 1.29e4})},
     "AttitudeEstimator": {"a gyroscope that is stuck": ("crmpc-2022/estimator", {f"measured.gyroscope.{axis}": 0.01 for axis in "xyz"})},
     "EntryNavigation": {
-        "sensors of one's own": ("entry/navigated", {"sensor.set": 2, "gyroscope.instability": 1e-5, "gyroscope.correlation": 3e3, "gyroscope.noise": 1e-4, "accelerometer.instability": 1e-2, "accelerometer.correlation": 3e3, "accelerometer.noise": 1e-2}),
         "a star tracker": ("entry/navigated", {"star.fix": 1, "star.attitude.w": 0.7, "star.attitude.x": 0.7}),
         "a start without a fix": ("entry/navigated", {"gnss.fix": 0}),
     },
     "ReentryPlant": {
         "fixes of a star tracker": ("entry/navigated", {"sensor.star.period": 0.2, "sensor.gnss.period": 0.2}),
-        "biases that wander": ("entry/navigated", {"sensor.set": 2} | {f"sensor.{name}.instability": 1e-3 for name in ("gyroscope", "accelerometer", "magnetometer")}),
         "rotating Earth": ("crmpc-2022/lqr", {"trajectory.earthRate": 7.292115e-5}),
         "air of six rows": ("entry/from-120km", {"air.rows": 6} | {f"air.altitude[{k}]": 117e3 + 500 * k for k in ROWS[:6]} | {f"air.wind.{axis}[{k}]": 9.0 * k for k in ROWS[:6] for axis in ("north", "east")}),
         "disturbance of eight rows": ("crmpc-2022/lqr", {"disturbance.kind": "table", "disturbance.table.rows": 8} | {f"disturbance.table.time[{k}]": 4.0 * k for k in ROWS} | {f"disturbance.table.{axis}[{k}]": (-0.1) ** k for k in ROWS for axis in ("alpha", "beta", "sigma")}),

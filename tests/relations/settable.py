@@ -45,6 +45,14 @@ FLOWN, DRIVEN, SHORT, LONGEST = 3000, 60, 8, 100_000
 NEVER, STEPPED = "no setting of this FMU", "co-simulation"
 # Files for parameters that are texts, all of which name files.
 VEHICLE = ROOT / "orchestrator" / "experiments" / "entry" / "vehicles" / "lifting-body.toml"
+TUNING = {
+    "ReentryPlant": "sensor.gravity = 9.0\nsensor.gyroscope.bias.x = 0.01",
+    "EntryGuidance": "bank.final = 0.3",
+    "EntryNavigation": "alignment.attitude = 0.01",
+    "AttitudeEstimator": "filter.cutoff = 3.0",
+    "CRMPC": "terminal.k1 = -1.0\nterminal.k2 = -2.5",
+    "DLMPC": "reference.previewAcceleration.alpha = 0.1\nsolver.maxIterations = 1",
+}
 FILE = "time_s,alpha_rad,beta_rad,sigma_rad\n0,0.1,0.0,-0.3\n100,0.2,0.1,-0.4\n"
 
 
@@ -158,6 +166,8 @@ class Driven:
         self.bases: dict[tuple, list] = {}
         self.file = folder / "reference.csv"
         self.file.write_text(FILE)
+        self.tuning = folder / "settings.toml"
+        self.tuning.write_text(TUNING.get(fmu.name, ""))
 
     def value(self, name: str, written):
         """A value in the type of its variable, from a text or a number."""
@@ -226,7 +236,7 @@ class Driven:
         if variable.type == "Boolean":
             return [not now]
         if variable.type == "String":
-            return [str(VEHICLE if name == "vehicle.file" else self.file)]
+            return [str({"vehicle.file": VEHICLE, "settings.file": self.tuning}.get(name, self.file))]
         if variable.type == "Enumeration":
             return [int(item.value) for item in variable.declaredType.items if int(item.value) != now]
         ends = [None if end is None else float(end) for end in (variable.min, variable.max)]

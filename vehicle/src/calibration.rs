@@ -1,53 +1,26 @@
 //! Rotation sequence for the calibration of sensors. The platform turns so that every direction
 //! fixed in space points along every direction of the body at some time.
 
-use crate::error::{Error, finite};
 use crate::kinematics::Kinematics;
 use crate::math::sin_cos;
-use crate::state::{BETA_LIMIT, State, state};
+use crate::state::{State, state};
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
-use settings::Declared;
 
 /// Calibration sequence: α and σ turn at constant rates, and β swings as β₀ + amplitude ·
 /// sin(frequency · t).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sequence {
-    /// Rate of the angle of attack in the calibration sequence.
-    #[setting(name = "rate.alpha", unit = "rad/s", nominal = 0.1)]
+    /// Rate of the angle of attack, rad/s.
     pub alpha_rate: f64,
-    /// Rate of the bank angle in the calibration sequence.
-    #[setting(name = "rate.sigma", unit = "rad/s", nominal = 0.1)]
+    /// Rate of the bank angle, rad/s.
     pub sigma_rate: f64,
-    /// Amplitude of the sideslip angle in the calibration sequence.
-    #[setting(name = "beta.amplitude", unit = "rad", min = 0.0, nominal = 0.5)]
+    /// Amplitude of the sideslip angle, rad.
     pub beta_amplitude: f64,
-    /// Angular frequency of the sideslip angle in the calibration sequence.
-    #[setting(name = "beta.frequency", unit = "rad/s", nominal = 0.1)]
+    /// Angular frequency of the sideslip angle, rad/s.
     pub beta_frequency: f64,
 }
 
 impl Sequence {
-    /// Refuses a sequence that reaches the singular sideslip angle from the `initial` angles (rad).
-    ///
-    /// # Errors
-    /// Names the value at fault by its path in the configuration of the plant.
-    pub fn check(&self, initial: &Vector3<f64>) -> Result<(), Error> {
-        let values = [self.alpha_rate, self.sigma_rate, self.beta_amplitude, self.beta_frequency];
-        finite("calibration", &values)?;
-        let reach = initial.y.abs() + self.beta_amplitude.abs();
-        if reach >= BETA_LIMIT {
-            let problem = format!(
-                "= {} deg: with initial.beta, beta reaches {} deg, but it must stay within 90 deg",
-                self.beta_amplitude.to_degrees(),
-                reach.to_degrees()
-            );
-            return Err(Error::parameter("calibration.beta.amplitude", problem));
-        }
-        Ok(())
-    }
-
     /// Attitude angles Θ and their derivatives Θ̇ and Θ̈ (rad, s) at `time` (s) after the start at
     /// the angles `initial` (rad).
     pub fn angles_and_derivatives(&self, initial: &Vector3<f64>, time: f64) -> [Vector3<f64>; 3] {

@@ -5,10 +5,9 @@ mod given;
 pub(crate) use given::{GivenJets, GivenSurfaces};
 
 use crate::aerodynamics::{Flow, SurfaceTable};
-use crate::axes::{Entry, MOMENTS};
+use crate::axes::Entry;
 use nalgebra::{SMatrix, SVector, Vector3};
 use serde::{Deserialize, Serialize};
-use settings::Declared;
 
 /// Number of aerodynamic surfaces of the vehicle.
 pub const SURFACES: usize = 8;
@@ -33,59 +32,35 @@ pub type Surfaces = SVector<f64, SURFACES>;
 pub type Jets = SVector<f64, JETS>;
 
 /// Moments and limits of the surfaces and jets. Moments act about the body axes x forward, y right,
-/// z down; a deflection with the trailing edge down is positive.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+/// z down; a deflection with the trailing edge down is positive. Without a vehicle's file they are
+/// those of Wu 2015.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Effectors {
-    /// Lower limit on the deflection of the {}.
-    #[setting(name = "limit.surfaceMin", each = SURFACE_NAMES, unit = "rad", max = 0.0, nominal = 0.1)]
-    #[setting(used_with = "surfaceAllowed[{#}] = true")]
+    /// Lower limits on the deflections (63), rad.
     pub min: Surfaces,
-    /// Upper limit on the deflection of the {}.
-    #[setting(name = "limit.surfaceMax", each = SURFACE_NAMES, unit = "rad", min = 0.0, nominal = 0.1)]
-    #[setting(used_with = "surfaceAllowed[{#}] = true")]
+    /// Upper limits on the deflections (63), rad.
     pub max: Surfaces,
-    /// Upper limit on the magnitude of the deflection rate of the {}.
-    #[setting(name = "limit.surfaceRate", each = SURFACE_NAMES, unit = "rad/s", min = 0.0)]
-    #[setting(nominal = 0.1)]
-    #[setting(
-        used_with = "surfaceAllowed[{#}] = true and (surfaceMoment[1,{#}] != 0 or surfaceMoment[2,{#}] != 0 or surfaceMoment[3,{#}] != 0)"
-    )]
+    /// Upper limits on the magnitudes of the deflection rates (63), rad/s.
     pub rate: Surfaces,
-    /// Whether the {} may be used; otherwise it is kept at zero.
-    ///
-    /// In Wu 2015 (65) all but the rudders may.
-    #[setting(name = "surfaceAllowed", each = SURFACE_NAMES)]
-    #[setting(
-        used_with = "(surfaceMoment[1,{#}] != 0 or surfaceMoment[2,{#}] != 0 or surfaceMoment[3,{#}] != 0)"
-    )]
+    /// Whether each surface may be used; otherwise it is kept at zero. In (65) all but the rudders
+    /// may.
     pub allowed: [bool; SURFACES],
-    /// Dynamic pressure for which surfaceMoment is given.
-    #[setting(name = "dynamicPressure.reference", unit = "Pa", above = 0.0, nominal = 1e3)]
+    /// Dynamic pressure for which `effectiveness` is given, Pa.
     pub reference_pressure: f64,
-    /// {} per deflection of the {} (matrix D_A).
-    ///
-    /// Wu 2015 (58); the values are representative, as the paper prints none.
-    #[setting(name = "surfaceMoment", each = MOMENTS, columns = SURFACE_NAMES)]
-    #[setting(unit = "N.m/rad", nominal = 1e5, used_with = "surfaceAllowed[{#}] = true")]
+    /// Moment per deflection (matrix D_A, (58)), N m/rad; the values are representative, as the
+    /// paper prints none.
     pub effectiveness: SMatrix<f64, 3, SURFACES>,
-    /// {} of jet {} at full thrust (matrix D_RCS).
-    ///
-    /// Wu 2015 (64).
-    #[setting(name = "jetMoment", each = MOMENTS, unit = "N.m", nominal = 1e4)]
+    /// Moment of each jet at full thrust (matrix D_RCS, (64)), N m.
     pub jet_moments: SMatrix<f64, 3, JETS>,
     /// Name of each aerodynamic surface.
-    #[setting(skip)]
     pub names: [String; SURFACES],
     /// Moments of surfaces that depend on the angle of attack and the Mach number. They add to
     /// those of `effectiveness`.
-    #[setting(skip)]
     pub tables: Vec<SurfaceTable>,
     /// Thrust of one jet when it is on, N.
-    #[setting(skip)]
     pub jet_force: f64,
     /// Replacement for the fourth column of `jet_moments` that mirrors the eighth, N m;
     /// [`Effectors::symmetric`] uses it.
-    #[setting(skip)]
     pub symmetric_jet_4: Vector3<f64>,
 }
 
@@ -112,9 +87,10 @@ impl Effectors {
         for (i, name) in self.names.iter().enumerate() {
             // Zero must lie within the limits because deflections start there.
             let holds_zero = self.min[i] <= 0.0 && 0.0 <= self.max[i];
-            if !(holds_zero && self.min[i].is_finite() && self.max[i].is_finite()) {
+            let turns = self.max[i].max(-self.min[i]) > std::f64::consts::PI;
+            if turns || !holds_zero {
                 return Err(format!(
-                    "surfaces.min_deg: the limits min_deg and max_deg of '{name}' must be finite and hold 0"
+                    "surfaces.min_deg: the limits min_deg and max_deg of '{name}' must hold 0 and lie within 180 degrees"
                 ));
             }
             if !positive(self.rate[i]) {

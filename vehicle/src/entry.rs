@@ -51,11 +51,9 @@ pub struct Deviations {
     pub side: f64,
     /// Ratio of the actual to the nominal moments of the air, without those of the surfaces.
     #[setting(name = "moment.scale", min = 0.0, max = 10.0, nominal = 1.0)]
-    #[setting(used_with = "aerodynamics.vehicle = papers")]
     pub moment: f64,
     /// Error of the coefficient of the pitch moment at trim.
     #[setting(name = "pitch.offset", min = -1.0, max = 1.0, nominal = 1e-3)]
-    #[setting(used_with = "aerodynamics.vehicle = papers")]
     pub pitch: f64,
 }
 

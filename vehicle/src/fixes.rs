@@ -25,18 +25,22 @@ pub struct Gnss {
     /// Standard deviation of the position of a fix, along each axis.
     #[setting(name = "noise.position", unit = "m", min = 0.0, nominal = 5.0)]
     #[setting(used_with = "~.period > 0")]
+    #[setting(file)]
     pub position_noise: f64,
     /// Standard deviation of the velocity of a fix, along each axis.
     #[setting(name = "noise.velocity", unit = "m/s", min = 0.0, nominal = 0.1)]
     #[setting(used_with = "~.period > 0")]
+    #[setting(file)]
     pub velocity_noise: f64,
     /// Altitude at which the plasma begins to hold back the signals; it ends at blackout.bottom.
     #[setting(name = "blackout.top", unit = "m", nominal = 1e5)]
     #[setting(used_with = "~.period > 0")]
+    #[setting(file)]
     pub blackout_top: f64,
     /// Altitude below which the signals are received again.
     #[setting(name = "blackout.bottom", unit = "m", nominal = 1e5)]
     #[setting(used_with = "~.period > 0")]
+    #[setting(file)]
     pub blackout_bottom: f64,
     /// Fault of the receiver: {}
     #[setting(used_with = "~.period > 0")]
@@ -52,10 +56,12 @@ pub struct StarTracker {
     /// Standard deviation of the attitude of a fix, about each axis.
     #[setting(unit = "rad", min = 0.0, nominal = 1e-4)]
     #[setting(used_with = "~.period > 0")]
+    #[setting(file)]
     pub noise: f64,
     /// Altitude above which the star tracker sees stars.
     #[setting(name = "altitude", unit = "m", nominal = 1e5)]
     #[setting(used_with = "~.period > 0")]
+    #[setting(file)]
     pub least_altitude: f64,
     /// Fault of the star tracker: {}
     #[setting(used_with = "~.period > 0")]

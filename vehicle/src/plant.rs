@@ -32,7 +32,6 @@ use crate::sensors::Sensors;
 use crate::time::tolerance;
 use crate::transport::Transport;
 use crate::turntable::Turntable;
-use config::Calibration;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -56,7 +55,6 @@ pub struct Plant {
     actuators: Option<Actuators>,
     transport: Option<Transport>,
     moment_resolution: f64,
-    calibration: Option<Calibration>,
     surroundings: Surroundings,
     sensors: Option<Sensors>,
     turntable: Option<Turntable>,
@@ -191,7 +189,7 @@ impl Plant {
                 } else {
                     let mut f = |t: f64, state: &State| {
                         let load = self.load((t, t - time), state[0], &input(t), &held);
-                        self.derivative_at(t, state, &load)
+                        equations::derivative(&self.body, self.kinematics, state, &load)
                     };
                     (self.motion, rk4(&mut f, begin, &self.state, h))
                 };

@@ -108,7 +108,6 @@ impl Scenario {
             moment_resolution: 0.0,
             motion: Motion::zeros(),
             entry: None,
-            calibration: None,
             surroundings: Surroundings::default(),
             sensors: None,
             turntable: turntable::Config::default(),

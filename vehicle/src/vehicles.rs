@@ -11,6 +11,7 @@ use crate::dynamics::Inertia;
 use crate::effectors::{Effectors, GivenJets, GivenSurfaces};
 use crate::error::Error;
 use crate::given;
+use crate::scenario::Scenario;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::Read;
@@ -25,8 +26,8 @@ const LARGEST: u64 = 16_000_000;
 pub struct Vehicle {
     /// Forces and moments of the air, with mass and reference quantities.
     pub aerodynamics: Aerodynamics,
-    /// Inertia, if the file gives it.
-    pub inertia: Option<Inertia>,
+    /// Nominal inertia.
+    pub inertia: Inertia,
     /// Surfaces and jets, if the file gives some.
     pub effectors: Option<Effectors>,
     /// Hash of the file by FNV-1a, by which saved states recognise it.
@@ -44,8 +45,8 @@ struct Given {
     title: String,
     /// Mass, and the quantities to which the coefficients refer.
     reference: Reference,
-    /// Inertia about the centre of mass. Without it the parameters inertia.* apply.
-    inertia: Option<GivenInertia>,
+    /// Inertia about the centre of mass.
+    inertia: GivenInertia,
     /// Coefficients of the forces along the flow.
     forces: Forces,
     /// Coefficients of the moments. Those that are left out are zero.
@@ -89,11 +90,14 @@ struct GivenInertia {
 }
 
 impl Vehicle {
-    /// Reads a vehicle from a file.
+    /// Reads a vehicle from a file, or returns the shipped one of [`SHIPPED`] with this name.
     ///
     /// # Errors
     /// Names the file, the line and the key at fault.
     pub fn read(path: &Path) -> Result<Self, Error> {
+        if let Some(shipped) = path.to_str().and_then(Self::shipped).filter(|_| !path.exists()) {
+            return Ok(shipped);
+        }
         let file = path.display().to_string();
         let refuse = |problem: String| Error::Vehicle { file: file.clone(), line: None, problem };
         // A device or a pipe may have no end, or not even open.
@@ -136,6 +140,10 @@ impl Vehicle {
                 return Err(refuse(None, &text));
             }
         }
+        if let Some((key, drag)) = forces.drag.negative() {
+            let text = format!("forces.drag.{key} gives {drag}, which would be thrust");
+            return Err(refuse(None, &text));
+        }
         let has_moments = moments != Moments::default();
         let aerodynamics = Aerodynamics { title, reference, forces, moments, heating, air };
         let lengths = aerodynamics.lengths();
@@ -145,11 +153,9 @@ impl Vehicle {
                 "reference.span and chord are missing, to which moments refer",
             ));
         }
-        let inertia =
-            inertia.map(|GivenInertia { Ixx, Iyy, Izz, Ixz, .. }| Inertia { Ixx, Iyy, Izz, Ixz });
-        if let Some(inertia) = &inertia {
-            inertia.body(1.0).map_err(|error| refuse(None, &error.to_string()))?;
-        }
+        let GivenInertia { Ixx, Iyy, Izz, Ixz, .. } = inertia;
+        let inertia = Inertia { Ixx, Iyy, Izz, Ixz };
+        inertia.body(1.0).map_err(|error| refuse(None, &error.to_string()))?;
         let mut effectors = Effectors::none();
         let has_effectors = surfaces.is_some() || jets.is_some();
         if let Some(jets) = jets {
@@ -176,7 +182,7 @@ impl Vehicle {
     /// Returns whether a restored vehicle can be flown: its data may be corrupt.
     pub fn fits(&self) -> bool {
         self.effectors.as_ref().is_none_or(|effectors| effectors.check().is_ok())
-            && self.inertia.is_none_or(|inertia| inertia.body(1.0).is_ok())
+            && self.inertia.body(1.0).is_ok()
     }
 }
 
@@ -196,8 +202,25 @@ fn embedded(file: &str, text: &str) -> Vehicle {
     Vehicle::from_toml(file, text).unwrap_or_else(|error| panic!("{error}"))
 }
 
+/// Names of the shipped vehicles. That of Chai 2022 is the default. Those of the other papers differ
+/// from it by their inertia.
+pub const SHIPPED: [&str; 4] = ["chai2022", "wu2015", "jia", "shuttle"];
+
 impl Vehicle {
-    /// Returns the vehicle of the papers: the Shuttle's forces at the same wing loading,
+    /// Returns the shipped vehicle with a name of [`SHIPPED`].
+    pub fn shipped(name: &str) -> Option<Self> {
+        let with =
+            |scenario: Scenario| Self { inertia: scenario.inertia, ..Self::papers().clone() };
+        match name {
+            "chai2022" => Some(Self::papers().clone()),
+            "wu2015" => Some(with(Scenario::tvsmc2015())),
+            "jia" => Some(with(Scenario::two_loop())),
+            "shuttle" => Some(embedded("shuttle.toml", include_str!("../data/shuttle.toml"))),
+            _ => None,
+        }
+    }
+
+    /// Returns the vehicle of Chai 2022: the Shuttle's forces at the same wing loading,
     /// representative moments, and the surfaces and jets of Wu 2015, section 6, as printed, with a
     /// representative effectiveness of the surfaces.
     pub fn papers() -> &'static Self {

@@ -137,6 +137,12 @@ area = { square_feet = 0.222222222222222 }
 span = { feet = 0.333333333333333 }
 chord = { feet = 0.666666666666667 }
 
+[inertia]
+source = "NASA/TM-2015-218675, volume II, B.3, in kg m2"
+Ixx = 0.002568217
+Iyy = 0.008421011
+Izz = 0.009754656
+
 [forces]
 lift = { source = "none, as in the case", polynomial = [0.0] }
 drag = { source = "none, as in the case", polynomial = [0.0] }

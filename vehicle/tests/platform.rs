@@ -4,9 +4,8 @@
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 use std::f64::consts::FRAC_PI_2;
-use vehicle::calibration::Sequence;
 use vehicle::kinematics::Kinematics;
-use vehicle::plant::{BETA_LIMIT, Input, Plant};
+use vehicle::plant::Plant;
 use vehicle::platform::{Pose, Surroundings, body_from_velocity, velocity_from_level};
 use vehicle::scenario::Scenario;
 use vehicle::sensor_data::SensorData;
@@ -125,36 +124,6 @@ proptest! {
     }
 }
 
-/// A plant that flies the calibration sequence.
-fn calibrating(sequence: Sequence, kinematics: Kinematics) -> Plant {
-    let mut config = Scenario::crmpc2022().config(0.01);
-    config.calibration = Some(sequence);
-    config.kinematics = kinematics;
-    config.surroundings = AROUND;
-    Plant::new(&config, 0.0).unwrap()
-}
-
-#[test]
-fn oracle_along_the_calibration_sequence_the_gyroscope_is_the_change_of_orientation() {
-    let sequence = SensorData::embedded().calibration;
-    let initial = Scenario::crmpc2022().initial_angles;
-    for kinematics in [Kinematics::Printed, Kinematics::Exact] {
-        let mut plant = calibrating(sequence, kinematics);
-        for k in 0..100 {
-            let time = 0.3 * f64::from(k);
-            plant.advance(time, time + 0.3, Vector3::new(1e5, 1e5, 1e5)).unwrap();
-            let time = time + 0.3;
-            let [angles, ..] = sequence.angles_and_derivatives(&initial, time);
-            assert!((plant.angles() - angles).amax() < 1e-10, "{}", plant.angles() - angles);
-            let expected = rate_of(|t| {
-                body_from_velocity(&sequence.angles_and_derivatives(&initial, time + t)[0])
-            });
-            let [found, ..] = plant.felt(time, &Input::default());
-            assert!((found - expected).amax() < 1e-9, "{kinematics:?}: {}", found - expected);
-        }
-    }
-}
-
 /// Returns `count` directions spread evenly over the sphere.
 fn directions(count: u32) -> impl Iterator<Item = Vector3<f64>> {
     (0..count).map(move |k| {
@@ -184,19 +153,8 @@ fn in_two_minutes_the_calibration_sequence_sees_every_direction_within_13_degree
 }
 
 #[test]
-fn a_calibration_sequence_that_comes_to_the_singular_sideslip_is_refused_by_name() {
+fn gravity_that_points_up_is_refused_by_name() {
     let mut config = Scenario::crmpc2022().config(0.01);
-    let sequence = SensorData::embedded().calibration;
-    config.calibration =
-        Some(Sequence { beta_amplitude: BETA_LIMIT - config.initial[1], ..sequence });
-    let message = Plant::new(&config, 0.0).unwrap_err().to_string();
-    assert!(
-        message.contains("calibration.beta.amplitude") && message.contains("90 deg"),
-        "{message}"
-    );
-    config.calibration = Some(Sequence { alpha_rate: f64::NAN, ..sequence });
-    assert!(Plant::new(&config, 0.0).unwrap_err().to_string().contains("calibration"));
-    config.calibration = None;
     config.surroundings.gravity = -1.0;
     assert!(Plant::new(&config, 0.0).unwrap_err().to_string().contains("sensor.gravity"));
 }

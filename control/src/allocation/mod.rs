@@ -1,6 +1,7 @@
 //! Control allocation: deflections and jets that give the commanded moment. The methods are those
 //! of Wu et al. (2015), section 5, and the selector of Jia et al., section IV.
 
+pub mod attainable;
 mod optimum;
 pub mod pwpf;
 mod settings;
@@ -10,6 +11,7 @@ pub use settings::{JetCommand, Method, Settings};
 use crate::clock::Instant;
 use crate::error::DesignError;
 use ::settings::{Choice, Declared};
+use attainable::{Ball, Reach, largest_ball};
 use nalgebra::{SMatrix, Vector3};
 use optimum::{OptimalAllocation, Weights};
 use pwpf::Modulator;
@@ -109,6 +111,17 @@ pub struct Memory {
     /// Outcome of the last allocation.
     #[setting(name = "solver")]
     pub report: AllocationReport,
+    /// What surfaces and jets can give, leaving the rates of the surfaces aside.
+    #[setting(depends_on = ["dynamicPressure", "flow.*"])]
+    pub attainable: Ball,
+    /// The same within one period, in which the rates of the surfaces limit them.
+    #[setting(name = "attainable.momentInPeriod", unit = "N.m", nominal = 1e5)]
+    #[setting(depends_on = ["dynamicPressure", "flow.*"])]
+    pub in_period: f64,
+    /// The same as attainable.moment for the surfaces alone.
+    #[setting(name = "attainable.momentBySurfaces", unit = "N.m", nominal = 1e5)]
+    #[setting(depends_on = ["dynamicPressure", "flow.*"])]
+    pub surfaces_alone: f64,
     /// Modulators of the jets, one for each.
     #[setting(skip)]
     pub modulators: [Modulator; JETS],
@@ -230,6 +243,9 @@ impl Allocator {
             matrix += slopes;
             moment -= offset;
         }
+        if finite {
+            self.attain(memory, command, (&matrix, &(commanded - moment)), (&low, &high));
+        }
         let mut first = 0;
         if finite && self.settings.method == Method::Blending {
             // Jia et al., section IV: the surfaces give as much as they can; below the threshold
@@ -269,6 +285,45 @@ impl Allocator {
             time: begin.elapsed().as_secs_f64(),
             fallbacks: memory.report.fallbacks.saturating_add(u32::from(optimum.is_none())),
         };
+    }
+}
+
+impl Allocator {
+    /// Finds the moments that can be attained. The model of the surfaces within one period is given:
+    /// its slopes, its moment at zero deflection (N m), and the deflections in reach.
+    fn attain(
+        &self,
+        memory: &mut Memory,
+        command: &Command,
+        in_period: (&SMatrix<f64, 3, SURFACES>, &Vector3<f64>),
+        reach: (&Surfaces, &Surfaces),
+    ) {
+        let effectors = &self.settings.effectors;
+        let rests = self.settings.method == Method::Blending
+            && command.dynamic_pressure < self.settings.threshold;
+        let at_rest = (Surfaces::zeros(), Surfaces::zeros());
+        let (min, max) = if rests { &at_rest } else { &self.limits };
+        let reach = if rests { (min, max) } else { reach };
+        let mut matrix = effectors.effectiveness_at(command.dynamic_pressure);
+        let mut offset = Vector3::zeros();
+        if !effectors.tables.is_empty() {
+            let (slopes, at_zero) = secant(effectors, &command.flow(), min, max);
+            matrix += slopes;
+            offset = at_zero;
+        }
+        let with_jets = |matrix: &SMatrix<f64, 3, SURFACES>, low: &Surfaces, high: &Surfaces| {
+            std::array::from_fn::<Reach, { SURFACES + JETS }, _>(|i| {
+                match i.checked_sub(SURFACES) {
+                    None => (matrix.column(i).into(), low[i], high[i]),
+                    Some(jet) => (effectors.jet_moments.column(jet).into(), 0.0, 1.0),
+                }
+            })
+        };
+        let all = with_jets(&matrix, min, max);
+        memory.attainable = largest_ball(&all, &offset);
+        memory.surfaces_alone = largest_ball(&all[..SURFACES], &offset).radius;
+        memory.in_period =
+            largest_ball(&with_jets(in_period.0, reach.0, reach.1), in_period.1).radius;
     }
 }
 

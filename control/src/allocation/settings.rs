@@ -60,7 +60,7 @@ pub struct Settings {
     #[setting(name = "weight.surface", min = 0.0)]
     pub weight_surface: f64,
     /// Model of surfaces and jets and of their limits that the allocator uses.
-    #[setting(name = "")]
+    #[setting(skip)]
     pub effectors: Effectors,
     /// Modulator of the jets, whose settings count with `jets` = pwpf alone.
     #[setting(skip)]

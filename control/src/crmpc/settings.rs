@@ -114,9 +114,11 @@ pub struct Settings {
     /// Gain K of the feedback law (20), by rule if both factors are 0.
     pub feedback: Gain,
     /// Gain K~ of the terminal law (14).
+    #[setting(file)]
     pub terminal: Gain,
     /// Gain for the paper's tube constant in (21).
     #[setting(used_with = "constraints = paper")]
+    #[setting(file)]
     pub tube: Gain,
     /// Bound on each component of the disturbance of the angles' second derivatives; the
     /// constraint sets are tightened for it.
@@ -137,14 +139,17 @@ pub struct Settings {
     /// Largest magnitude of the sideslip angle for which the bounds of the paper's design hold.
     #[setting(name = "bound.sideslip", unit = "rad", min = 0.0, max = 1.5, nominal = 0.2)]
     #[setting(used_with = "constraints = paper")]
+    #[setting(file)]
     pub sideslip_bound: f64,
     /// Bound on the norm of the reference's first derivative in the paper's terminal set (13).
     #[setting(name = "bound.referenceRate", unit = "rad/s", min = 0.0, nominal = 0.05)]
     #[setting(used_with = "constraints = paper")]
+    #[setting(file)]
     pub reference_rate: f64,
     /// Bound on the norm of the reference's second derivative in the paper's terminal set (13).
     #[setting(name = "bound.referenceAcceleration", unit = "rad/s2", min = 0.0, nominal = 0.02)]
     #[setting(used_with = "constraints = paper")]
+    #[setting(file)]
     pub reference_acceleration: f64,
     /// Bound on the measurement error of each angle beside its slow part, which may change
     /// arbitrarily from tick to tick; the robust set is tightened for it.
@@ -195,6 +200,7 @@ pub struct Settings {
     /// turn's own rate of limit.rate; without a turn it reserves nothing.
     #[setting(name = "trajectory.turnChange", unit = "rad/s", min = 0.0, nominal = 0.002)]
     #[setting(used_with = "constraints = robust")]
+    #[setting(file)]
     pub turn_change: f64,
     /// Bound on the norm of the known moment; the robust set is tightened for it.
     #[setting(name = "knownMoment.bound", unit = "N.m", min = 0.0, nominal = 1e4)]
@@ -225,6 +231,7 @@ pub struct Settings {
     #[setting(used_with = "constraints = robust")]
     pub sideslip_domain: f64,
     #[allow(missing_docs)]
+    #[setting(file)]
     pub observer: ObserverSettings,
     /// Whether the variables plan.* are computed at each optimisation.
     #[setting(name = "plan.shown")]

@@ -47,16 +47,19 @@ pub struct Settings {
     pub kinematics: Kinematics,
     /// Direction of the horizontal magnetic field relative to the velocity, positive to the east.
     #[setting(name = "field.declination", unit = "rad", nominal = 0.1)]
+    #[setting(file)]
     pub declination: f64,
     /// Time from the first sample during which the platform rests and the gyroscope's bias is
     /// measured; 0 for none.
     #[setting(name = "rest.duration", unit = "s", min = 0.0, nominal = 1.0)]
+    #[setting(file)]
     pub rest_duration: f64,
     /// Sampling period of the estimator and of the sensors.
     #[setting(unit = "s", min = 1e-4, max = 10.0, nominal = 0.01)]
     pub period: f64,
     /// Cut-off frequency of the low-pass filter on all readings; 0 for no filter.
     #[setting(name = "filter.cutoff", unit = "Hz", min = 0.0, nominal = 10.0)]
+    #[setting(file)]
     pub cutoff: f64,
     /// Whether the estimate is predicted forward over the delays of sensors, transmission and
     /// filter.
@@ -67,16 +70,20 @@ pub struct Settings {
     pub sensor_delay: f64,
     /// Gains of the nine-axis fusion.
     #[setting(name = "fusion")]
+    #[setting(file)]
     pub gains: Gains,
     /// Time without a usable sample after which the attitude counts as lost.
     #[setting(name = "lost.after", unit = "s", above = 0.0, nominal = 0.5)]
+    #[setting(file)]
     pub lost_after: f64,
     /// Number of equal readings in a row from which a sensor counts as frozen; 0 for never, as
     /// needed for sensors without noise.
     #[setting(name = "frozen.samples", min = 0)]
+    #[setting(file)]
     pub frozen_samples: u32,
     /// Gates for the readings.
     #[setting(name = "")]
+    #[setting(file)]
     pub gates: PerSensor<Gate>,
     /// Sensor set, the same as in the plant: 0 and 1 are sensors without errors; 2 uses
     /// sensor.delay and the correction matrices and biases, by default those of the MEMS set.
@@ -84,14 +91,17 @@ pub struct Settings {
     pub sensor_set: i32,
     #[allow(missing_docs)]
     #[setting(name = "calibration.mode")]
+    #[setting(file)]
     pub calibration: CalibrationMode,
     /// Time during which readings are collected for the fit.
     #[setting(name = "calibration.duration", unit = "s", above = 0.0, nominal = 10.0)]
     #[setting(used_with = "calibration.mode = fit")]
+    #[setting(file)]
     pub calibration_duration: f64,
     /// Corrections of the readings.
     #[setting(name = "")]
     #[setting(used_with = "sensor.set = 2")]
+    #[setting(file)]
     pub corrections: PerSensor<Correction>,
 }
 

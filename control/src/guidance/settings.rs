@@ -14,18 +14,24 @@ pub struct Settings {
     #[allow(missing_docs)]
     pub initial: Initial,
     #[allow(missing_docs)]
+    #[setting(file)]
     pub bank: Bank,
     #[allow(missing_docs)]
+    #[setting(file)]
     pub alpha: Alpha,
     #[allow(missing_docs)]
+    #[setting(file)]
     pub reversal: Reversal,
     #[allow(missing_docs)]
+    #[setting(file)]
     pub shaping: Shaping,
     #[allow(missing_docs)]
+    #[setting(file)]
     pub damping: Damping,
     #[allow(missing_docs)]
     pub limit: Limit,
     #[allow(missing_docs)]
+    #[setting(file)]
     pub filter: Filter,
     #[allow(missing_docs)]
     pub planet: Ellipsoid,
@@ -48,9 +54,11 @@ pub struct Target {
     pub tolerance: f64,
     /// Altitude at which the flight is to end.
     #[setting(unit = "m", min = 0.0, nominal = 1e4)]
+    #[setting(file)]
     pub altitude: f64,
     /// Speed at which the flight is to end.
     #[setting(unit = "m/s", above = 0.0, nominal = 1e3)]
+    #[setting(file)]
     pub speed: f64,
 }
 
@@ -159,12 +167,15 @@ pub struct Limit {
     pub pressure: f64,
     /// Share of each limit that is kept in reserve.
     #[setting(min = 0.0, max = 0.5, nominal = 0.1)]
+    #[setting(file)]
     pub margin: f64,
     /// Time constant with which a limit is approached.
     #[setting(unit = "s", above = 0.0, nominal = 10.0)]
+    #[setting(file)]
     pub time: f64,
     /// Change of the cosine of the bank angle with the altitude rate at a limit.
     #[setting(unit = "s/m", min = 0.0, nominal = 1e-2)]
+    #[setting(file)]
     pub gain: f64,
 }
 

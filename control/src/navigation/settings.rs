@@ -23,25 +23,32 @@ pub struct Settings {
     /// Errors of the gyroscope, in rad/s.
     #[setting(unit = "rad/s", nominal = 1e-5)]
     #[setting(used_with = "sensor.set = 2")]
+    #[setting(file)]
     pub gyroscope: Errors,
     /// Errors of the accelerometer, in m/s².
     #[setting(unit = "m/s2", nominal = 1e-2)]
     #[setting(used_with = "sensor.set = 2")]
+    #[setting(file)]
     pub accelerometer: Errors,
     /// Initial state.
     pub initial: Initial,
     /// Alignment before the entry.
     pub alignment: Alignment,
     /// Fixes of satellite navigation and star tracker.
+    #[setting(file)]
     pub fix: Fix,
     /// Wind by the side force.
+    #[setting(file)]
     pub wind: Wind,
     /// Altitude by the drag.
+    #[setting(file)]
     pub drag: Drag,
     /// Time in which the shown state follows a correction; 0 for at once.
     #[setting(name = "blend.time", unit = "s", min = 0.0, max = 1e3, nominal = 3.0)]
+    #[setting(file)]
     pub blend: f64,
     /// When the navigation counts as healthy.
+    #[setting(file)]
     pub health: Trust,
 }
 
@@ -76,12 +83,15 @@ pub struct Initial {
 pub struct Alignment {
     /// Standard deviation of the initial attitude, about each axis.
     #[setting(unit = "rad", above = 0.0, max = 1.0, nominal = 1e-3)]
+    #[setting(file)]
     pub attitude: f64,
     /// Standard deviation of the initial position along each axis, if no fix gives it.
     #[setting(unit = "m", above = 0.0, nominal = 100.0)]
+    #[setting(file)]
     pub position: f64,
     /// Standard deviation of the initial velocity along each axis, if no fix gives it.
     #[setting(unit = "m/s", above = 0.0, nominal = 1.0)]
+    #[setting(file)]
     pub velocity: f64,
     /// Seed of the errors of the initial state, which have these deviations; 0 for none.
     #[setting(min = 0)]

@@ -1,13 +1,14 @@
 //! Operation of a controller's instance at its ticks.
 
 use crate::law::{ControllerFmu, ControllerInstance, Input, Law, Output, Parameters, Vehicle};
+use crate::own_vehicle::OwnVehicle;
 use crate::reference::{self, Source};
 use crate::sampled::{SampledInstance, Ticks};
 use crate::table;
 use control::controller::{Controller, Measurement};
 use control::delay::{Delayed, Latency};
 use control::schedule::ControllerInput;
-use fmi_export::{Context, Description, Failure};
+use fmi_export::{Context, Description, Failure, SettingsFile};
 use nalgebra::Vector3;
 use vehicle::Scenario;
 use vehicle::error::rounded_time;
@@ -27,8 +28,8 @@ impl<L: Law> ControllerInstance<L> {
     }
 
     fn vehicle(&self) -> Result<Vehicle, Failure> {
-        let Parameters { inertia, limit_rate, limit_moment, saturation, latency, .. } =
-            self.parameters;
+        let Parameters { limit_rate, limit_moment, saturation, latency, .. } = self.parameters;
+        let inertia = self.own.vehicle().inertia;
         let body = inertia.body(1.0).map_err(|error| Self::refusal(&error))?;
         Ok(Vehicle { body, limit_rate, limit_moment, saturation, latency })
     }
@@ -82,11 +83,12 @@ impl<L: Law> SampledInstance for ControllerInstance<L> {
     }
 
     fn new() -> Self {
+        // Reading it needs much of a small stack, of which initialization has used some already.
+        vehicle::Vehicle::papers();
         let scenario = Scenario::crmpc2022();
         Self {
             parameters: Parameters {
                 reference: reference::Parameters::default(),
-                inertia: scenario.inertia,
                 limit_rate: scenario.limit_rate,
                 limit_moment: scenario.limit_moment,
                 saturation: false,
@@ -94,6 +96,8 @@ impl<L: Law> SampledInstance for ControllerInstance<L> {
                 earth_rate: 0.0,
             },
             settings: L::settings(),
+            file: SettingsFile::default(),
+            own: OwnVehicle::default(),
             input: Input {
                 angles: scenario.initial_angles,
                 rates: scenario.initial_rates,
@@ -110,6 +114,8 @@ impl<L: Law> SampledInstance for ControllerInstance<L> {
     }
 
     fn load(&mut self, context: &Context) -> Result<(), Failure> {
+        self.file.clone().read(self, context)?;
+        self.own.load(context)?;
         self.source = Source::new(&self.parameters.reference, context)?;
         Ok(())
     }
@@ -195,6 +201,7 @@ impl<L: Law> SampledInstance for ControllerInstance<L> {
 
     fn problem(&self, before: &Self) -> Option<&'static str> {
         let fits = self.source == before.source || self.source.fits(&self.parameters.reference);
-        (!fits).then_some("its reference does not match its parameters")
+        let reference = (!fits).then_some("its reference does not match its parameters");
+        reference.or_else(|| self.own.problem(&before.own))
     }
 }

@@ -1,17 +1,18 @@
 //! The part of an FMU that a single control law adds, and the data that all controllers share.
 
+use crate::own_vehicle::OwnVehicle;
 use crate::reference::{self, Source};
 use crate::sampled::SampledFmu;
 use control::Controller;
 use control::controller::Scheduled;
 use control::delay::Latency;
 use control::error::DesignError;
-use fmi_export::VariableTable;
+use fmi_export::{SettingsFile, VariableTable};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use settings::Declared;
 use vehicle::axes::{ANGLES, Entry, MOMENTS, RATES};
-use vehicle::dynamics::{Inertia, RigidBody};
+use vehicle::dynamics::RigidBody;
 use vehicle::reference::Reference;
 use vehicle::trajectory::Trajectory;
 
@@ -57,6 +58,11 @@ pub struct ControllerInstance<L: Law> {
     /// Parameters of the law alone.
     #[setting(name = "")]
     pub settings: L::Settings,
+    #[setting(name = "")]
+    pub(crate) file: SettingsFile,
+    /// Vehicle that the controller assumes.
+    #[setting(name = "")]
+    pub own: OwnVehicle,
     /// Outputs of the law alone.
     #[setting(name = "", output, discrete, depends_on = SAMPLED)]
     pub law: L,
@@ -73,8 +79,6 @@ const SAMPLED: [&str; 6] =
 pub struct Parameters {
     /// Parameters of the reference.
     pub reference: reference::Parameters,
-    /// Inertia that the controller assumes.
-    pub inertia: Inertia,
     /// Upper limit on the norm of the body rates.
     #[setting(name = "limit.rate", unit = "rad/s", min = 1e-6, nominal = 0.1)]
     pub limit_rate: f64,

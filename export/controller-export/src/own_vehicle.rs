@@ -8,8 +8,8 @@ use vehicle::Vehicle;
 /// The file of a vehicle, and the vehicle that was read from it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct OwnVehicle {
-    /// Path of a TOML file with the vehicle, or name of a file in the resources of the FMU; empty
-    /// for the built-in vehicle.
+    /// Path of a TOML file with the vehicle, or name of a file in the resources of the FMU, or a
+    /// shipped vehicle: chai2022 (also if empty), wu2015, jia, shuttle.
     #[setting(name = "vehicle.file")]
     pub file: String,
     #[setting(skip)]

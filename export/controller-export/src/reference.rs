@@ -1,5 +1,5 @@
-//! The reference that a controller follows: a paper's profile, a constant, a sine, a lookup table,
-//! or the external inputs.
+//! The reference that a controller follows: a paper's profile, a constant, a lookup table, or
+//! the external inputs.
 
 use control::controller::{Forecast, Preview};
 use fmi_export::{Context, Failure};
@@ -25,9 +25,6 @@ pub enum Choice {
     TwoLoop,
     /// Constant angles reference.angle.
     Constant,
-    /// Term reference.angle plus a sine with reference.amplitude, reference.frequency and
-    /// reference.phase.
-    Sine,
     /// Values interpolated from the file reference.file.
     Table,
     /// Inputs reference.external; reference.preview says what predictions assume of their future.
@@ -53,28 +50,17 @@ pub struct Parameters {
     /// Path of a CSV file with time and angles, or name of a file in the resources of the FMU.
     #[setting(used_with = "reference.profile = table")]
     pub file: String,
-    /// Constant part of the reference.
+    /// Constant reference.
     #[setting(each = axes::ANGLES, unit = "rad", nominal = 0.1)]
-    #[setting(used_with = "reference.profile = constant or sine")]
+    #[setting(used_with = "reference.profile = constant")]
     pub angle: Vector3<f64>,
-    /// Amplitude of the sine in the reference.
-    #[setting(each = axes::ANGLES, unit = "rad", nominal = 0.1)]
-    #[setting(used_with = "reference.profile = sine")]
-    pub amplitude: Vector3<f64>,
-    /// Angular frequency of the reference sine.
-    #[setting(unit = "rad/s", min = 0.0, nominal = 1.0)]
-    #[setting(used_with = "reference.profile = sine and reference.amplitude.* != 0")]
-    pub frequency: f64,
-    /// Phase of the reference sine at t = 0.
-    #[setting(unit = "rad")]
-    #[setting(used_with = "reference.profile = sine and reference.amplitude.* != 0")]
-    pub phase: f64,
     #[allow(missing_docs)] // Its type says what it is.
     #[setting(used_with = "reference.profile = external")]
     pub preview: Ahead,
     /// Deceleration of the external reference in predictions.
     #[setting(each = axes::ANGLES, unit = "rad/s2", above = 0.0, nominal = 0.01)]
     #[setting(used_with = "reference.profile = external and reference.preview = brake")]
+    #[setting(file)]
     pub preview_acceleration: Vector3<f64>,
 }
 
@@ -85,9 +71,6 @@ impl Default for Parameters {
             profile: Choice::default(),
             file: String::new(),
             angle,
-            amplitude: Vector3::zeros(),
-            frequency: 1.0,
-            phase: 0.0,
             preview: Ahead::default(),
             // Half of what the entry guidance's bank angle brakes with, since it does not always
             // brake at once: with this the tracking error in an entry is a third less.
@@ -105,13 +88,12 @@ pub(crate) enum Source {
 
 impl Source {
     pub(crate) fn new(parameters: &Parameters, context: &Context) -> Result<Self, Failure> {
-        let Parameters { file, angle, amplitude, frequency, phase, .. } = parameters;
+        let Parameters { file, angle, .. } = parameters;
         Ok(match parameters.profile {
             Choice::Crmpc2022 => Self::Profile(Scenario::crmpc2022().reference),
             Choice::Tvsmc2015 => Self::Profile(Scenario::tvsmc2015().reference),
             Choice::TwoLoop => Self::Profile(Scenario::two_loop().reference),
             Choice::Constant => Self::Profile(Profile::constant(*angle)),
-            Choice::Sine => Self::Profile(Profile::sine(*angle, *amplitude, *frequency, *phase)),
             Choice::Table => Self::Profile(Profile::Table(table(file, context)?)),
             Choice::External => Self::External,
         })

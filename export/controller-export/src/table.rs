@@ -46,6 +46,10 @@ fn table<L: Law>() -> VariableTable<ControllerFmu<L>> {
         })
         .change("scheduled.disturbanceBound", |variable| variable.use_with(parts))
         .change("reference", external);
+    let has_file = settings::settings::<L::Settings>()
+        .iter()
+        .any(|setting| setting.place.role == settings::Role::File);
+    let table = if has_file || L::PLANS { table } else { table.without("settings.file") };
     // Other laws ask for no later reference than that of the instant at which their moment acts.
     if L::PLANS { table } else { table.without("reference.preview") }
 }

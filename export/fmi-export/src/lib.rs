@@ -72,6 +72,7 @@ mod progress;
 mod resource;
 mod saved;
 mod scalar;
+mod settings_file;
 pub mod table;
 #[doc(hidden)]
 pub mod types;
@@ -81,6 +82,7 @@ pub use export::sources;
 pub use model::{Context, EventInfo, Failure, Inputs, LastEvent, Model, Restoration};
 pub use model_instance::{Export, describe};
 pub use progress::MAX_INPUT_DERIVATIVE_ORDER;
+pub use settings_file::SettingsFile;
 pub use table::{Description, VariableTable};
 
 /// Items that the crate of a model needs, besides dependencies on `serde` and `settings`.

@@ -334,6 +334,7 @@ pub fn describe<M: Model>() -> ModelDescription {
         default_experiment,
         mut table,
     } = M::description();
+    let documentation = documentation + &table.settings_of_the_file();
     let mut model = M::new();
     for entry in &mut table.entries {
         if entry.variable.is_calculated() {

@@ -8,7 +8,7 @@ use model_description::unit::Unit;
 use model_description::variable::{
     Causality, EnumerationType, Variability, Variable, VariableKind,
 };
-use settings::{Declared, Field, Kind, Role, Setting};
+use settings::{Declared, Field, Kind, Place, Role, Setting};
 use std::sync::Arc;
 
 /// Access to the fields of a part of the model by their positions in it.
@@ -94,11 +94,38 @@ impl<M> Description<M> {
 /// The variables of an FMU in order; the position of each is its value reference.
 pub struct VariableTable<M> {
     pub(crate) entries: Vec<Entry<M>>,
+    /// Settings that a file sets, which are no variables.
+    of_file: Vec<Setting>,
 }
 
 impl<M> VariableTable<M> {
     pub(crate) fn variables(&self) -> impl Iterator<Item = &Variable> {
         self.entries.iter().map(|entry| &entry.variable)
+    }
+
+    /// Returns an HTML table of the settings that a file sets; empty if there are none.
+    pub(crate) fn settings_of_the_file(&self) -> String {
+        if self.of_file.is_empty() {
+            return String::new();
+        }
+        let row = |Setting { place, kind }: &Setting| {
+            let Place { name, text, unit, .. } = place;
+            let items = match kind {
+                Kind::Choice(items, _) => items.items.iter().map(|item| item.0).collect(),
+                _ => Vec::new(),
+            };
+            format!(
+                "<tr><td><code>{name}</code></td><td>{unit}</td><td>{} {}</td></tr>\n",
+                text.replace('&', "&amp;").replace('<', "&lt;"),
+                items.join(", ")
+            )
+        };
+        let rows: String = self.of_file.iter().map(row).collect();
+        format!(
+            "<h3>Settings of <code>settings.file</code></h3>\n<p>A TOML file may set what is no parameter. \
+             A number is in this unit; a text such as <code>\"20 deg\"</code> says its own.</p>\n\
+             <table><tr><th>name</th><th>unit</th><th>meaning</th></tr>\n{rows}</table>\n"
+        )
     }
 }
 
@@ -107,7 +134,7 @@ impl<M: 'static> VariableTable<M> {
     pub fn new<S: Declared + 'static>(
         part: impl Fn(&mut M) -> &mut S + Send + Sync + 'static,
     ) -> Self {
-        Self { entries: Vec::new() }.and(part)
+        Self { entries: Vec::new(), of_file: Vec::new() }.and(part)
     }
 
     /// Adds the declared fields of another part of the model.
@@ -117,10 +144,16 @@ impl<M: 'static> VariableTable<M> {
         part: impl Fn(&mut M) -> &mut S + Send + Sync + 'static,
     ) -> Self {
         let settings = settings::settings::<S>();
-        let variables: Vec<Variable> = settings.iter().map(variable).collect();
+        let declared: Vec<Setting> = settings.iter().cloned().collect();
         let part: Part<M> = Arc::new(move |model, index| settings.field(part(model), index));
-        for (index, variable) in variables.into_iter().enumerate() {
-            self.entries.push(Entry { variable, part: Arc::clone(&part), index });
+        for (index, setting) in declared.into_iter().enumerate() {
+            match causality(setting.place.role) {
+                Some(causality) => {
+                    let variable = variable(causality, &setting);
+                    self.entries.push(Entry { variable, part: Arc::clone(&part), index });
+                }
+                None => self.of_file.push(setting),
+            }
         }
         self
     }
@@ -178,14 +211,19 @@ pub(crate) fn resolved(mut variables: Vec<Variable>) -> Vec<Variable> {
     variables
 }
 
+/// Returns the causality of a variable, or `None` for a setting of a file.
+fn causality(role: Role) -> Option<Causality> {
+    match role {
+        Role::Parameter => Some(Causality::Parameter),
+        Role::Input => Some(Causality::Input),
+        Role::Output => Some(Causality::Output),
+        Role::Local => Some(Causality::Local),
+        Role::File => None,
+    }
+}
+
 /// Returns the variable that a field is.
-fn variable(Setting { place, kind }: &Setting) -> Variable {
-    let causality = match place.role {
-        Role::Parameter => Causality::Parameter,
-        Role::Input => Causality::Input,
-        Role::Output => Causality::Output,
-        Role::Local => Causality::Local,
-    };
+fn variable(causality: Causality, Setting { place, kind }: &Setting) -> Variable {
     let variability = if causality == Causality::Parameter {
         Variability::Fixed
     } else if place.is_discrete || !matches!(kind, Kind::Real) {

@@ -64,8 +64,6 @@ fn what_a_file_leaves_without_effect_is_refused() {
         })
     };
     assert_eq!(set(|_| {}), "");
-    let text = set(|allocator| allocator.settings.effectors.min[2] = -0.1);
-    assert!(text.contains("limit.surfaceMin is set, but vehicle.file"), "{text}");
     let text = set(|allocator| allocator.own.file = "no-such.toml".into());
     assert!(text.starts_with("vehicle.file: no-such.toml: "), "{text}");
     let mut blind = allocator(|allocator| allocator.command.mach = 0.0);

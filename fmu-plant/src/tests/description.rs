@@ -31,7 +31,7 @@ fn roles_and_names_agree() {
         ("flight.dynamicPressure", Unknown::Flight.into()),
         ("flow.alpha", Unknown::Flight.into()),
         ("measured.sample", Role::default()),
-        ("inertia.Ixx", Role::default()),
+        ("inertia.ratio.Ixx", Role::default()),
     ] {
         description.position(name).unwrap();
         assert_eq!(role(name), expected, "{name}");
@@ -66,8 +66,7 @@ fn the_description_holds() {
         _ => f64::NAN,
     };
     for (name, value) in [
-        ("inertia.Ixx", scenario.inertia.Ixx),
-        ("inertia.Ixz", scenario.inertia.Ixz),
+        ("inertia.ratio.Ixx", 1.0),
         ("inertia.scale", scenario.inertia_scale),
         ("initial.beta", scenario.initial_angles.y),
         ("disturbance.bound", scenario.disturbance.bound),

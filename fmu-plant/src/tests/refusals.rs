@@ -8,10 +8,10 @@ use vehicle::disturbance::DisturbanceKind;
 
 #[test]
 fn refusals_name_variables() {
-    let changes: [fn(&mut Parameters); 46] = [
-        |p| p.inertia.Ixx = 0.0,
-        |p| p.inertia.Ixz = 2e6,
-        |p| p.inertia.Iyy = 1e7,
+    let changes: [fn(&mut Parameters); 44] = [
+        |p| p.inertia_ratios[0] = 0.0,
+        |p| p.inertia_ratios[3] = 82.0,
+        |p| p.inertia_ratios[1] = 7.0,
         |p| p.inertia_scale = 0.0,
         |p| p.initial.alpha = f64::NAN,
         |p| p.initial.beta = 1.6,
@@ -40,8 +40,6 @@ fn refusals_name_variables() {
         |p| tabulate(p, 0.0, &[(0.0, [0.0, 0.0, f64::NAN])]),
         |p| p.sensing.surroundings.gravity = -1.0,
         |p| p.sensing.surroundings.field.x = f64::NAN,
-        |p| (p.sensing.calibrates, p.sensing.sequence.beta_amplitude) = (true, 1.5),
-        |p| (p.sensing.calibrates, p.sensing.sequence.alpha_rate) = (true, f64::NAN),
         |p| p.sensing.line.period = 0.0,
         |p| p.sensing.line.delay = 1e3,
         |p| p.sensing.line.drop_probability = 2.0,

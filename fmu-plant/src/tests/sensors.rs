@@ -1,4 +1,4 @@
-//! Tests of the sensors and the calibration sequence through the instance's interface.
+//! Tests of the sensors through the instance's interface.
 
 use super::model_exchange::{assert_same_motion, exchange, integrate};
 use super::{outputs, started, step};
@@ -159,30 +159,6 @@ fn initializing_again_starts_the_samples_again() {
     let first = stepped(&mut instance, 1.0 / 16.0);
     instance.initialize(&super::CONTEXT).unwrap();
     assert_eq!(stepped(&mut instance, 1.0 / 16.0), first);
-}
-
-#[test]
-fn the_calibration_sequence_is_flown_in_both_interfaces_whatever_the_moment() {
-    let set = |instance: &mut ReentryPlant| {
-        instance.parameters.sensing.calibrates = true;
-        instance.input.moment = Vector3::new(1e6, -1e6, 1e6);
-        instance.input.disturbance_moment = Vector3::new(1e6, 0.0, 0.0);
-        instance.input.trajectory.heading_rate = 0.1;
-    };
-    let [mut cs, mut me] = [0, 1].map(|_| started(set));
-    for k in 0..50 {
-        step(&mut cs, 0.2 * f64::from(k), 0.2 * f64::from(k + 1)).unwrap();
-    }
-    exchange(&mut me, 0.0, 10.0);
-    let [cs, me] = [&mut cs, &mut me].map(|instance| outputs(instance, 10.0));
-    assert!((cs.angles - me.angles).amax() < 1e-10 && (cs.rates - me.rates).amax() < 1e-10);
-    // 7.5 + 37·10, 10 + 40 sin 113 deg, -30 + 60·10
-    let expected = [377.5, 10.0 + 40.0 * 113f64.to_radians().sin(), 570.0].map(f64::to_radians);
-    assert!((cs.angles - Vector3::from(expected)).amax() < 1e-10, "{}", cs.angles);
-    let rates =
-        [37.0, 40.0 * 11.3f64.to_radians() * 113f64.to_radians().cos(), 60.0].map(f64::to_radians);
-    assert!((cs.angle_rates - Vector3::from(rates)).amax() < 1e-15);
-    assert!((cs.rates - r_inverse(&cs.angles) * cs.angle_rates).amax() < 1e-10);
 }
 
 #[test]

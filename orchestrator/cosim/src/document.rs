@@ -16,8 +16,8 @@ use serde::de::DeserializeOwned;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::{fs, iter};
-use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
+use toml::{Spanned, Value};
 
 /// A TOML file together with the files that it extends.
 ///
@@ -81,6 +81,28 @@ impl Source {
         self.files().map(|(path, _)| {
             path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
         })
+    }
+
+    /// Returns the whole document with the absolute paths of the files beside it, so that it can be
+    /// written to another folder.
+    pub fn movable(&self) -> String {
+        let mut values: Vec<Value> =
+            toml::from_str(self.whole()).map(Value::Table).into_iter().collect();
+        let mut text = self.whole().to_owned();
+        while let Some(value) = values.pop() {
+            match value {
+                Value::Table(table) => values.extend(table.into_iter().map(|(_, value)| value)),
+                Value::Array(array) => values.extend(array),
+                Value::String(file) if file.contains('.') && !file.contains('\n') => {
+                    let path = std::path::absolute(self.beside(Path::new(&file)));
+                    if let Some(path) = path.ok().filter(|path| path.is_file()) {
+                        text = text.replace(&format!("\"{file}\""), &format!("{path:?}"));
+                    }
+                }
+                _ => {}
+            }
+        }
+        text
     }
 
     fn files(&self) -> impl Iterator<Item = (&Path, &str)> {

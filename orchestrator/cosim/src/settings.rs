@@ -4,6 +4,7 @@ use crate::error::Error;
 use crate::experiment::Experiment;
 use fmi_master::settings::Setting;
 use fmi_master::wiring::{Part, Wire};
+use std::path::Path;
 use toml::Value;
 
 /// Resolves the settings of a component.
@@ -40,6 +41,16 @@ pub(crate) fn resolve(
         let setting = Setting::new(name, &value, index, part, wires, is_assigned);
         settings.push(setting.map_err(refuse)?);
     }
+    if let Some(flown) = &experiment.vehicle
+        && part.description.find(VEHICLE).is_some()
+        && !component.parameters.contains_key(VEHICLE)
+    {
+        let written = Value::from(flown.file.get_ref().as_str());
+        let value = file_beside(experiment, VEHICLE, &written).unwrap_or(written);
+        let setting = Setting::new(VEHICLE, &value, index, part, wires, false);
+        let refuse = |message| experiment.source.error(&flown.file.span(), message);
+        settings.push(setting.map_err(refuse)?);
+    }
     // A law in another program has none of the parameters of its controller.
     if !left_out.is_empty() && !experiment.is_flown_by_law(part.name) {
         tracing::warn!(
@@ -52,6 +63,9 @@ pub(crate) fn resolve(
     Ok(settings)
 }
 
+/// Parameter of every component that knows a vehicle.
+const VEHICLE: &str = "vehicle.file";
+
 /// Returns whether a parameter, such as `vehicle.file`, names a file.
 pub(crate) fn is_file(name: &str) -> bool {
     name.rsplit_once('.').is_some_and(|(_, last)| last == "file")
@@ -61,6 +75,6 @@ pub(crate) fn is_file(name: &str) -> bool {
 /// such as `vehicle.file` names it. FMUs themselves look for files in the working directory.
 fn file_beside(experiment: &Experiment, name: &str, written: &Value) -> Option<Value> {
     let file = written.as_str().filter(|_| is_file(name))?;
-    let path = experiment.source.folders().map(|folder| folder.join(file)).find(|p| p.is_file())?;
-    Some(Value::from(std::path::absolute(path).ok()?.to_str()?))
+    let path = std::path::absolute(experiment.source.beside(Path::new(file))).ok()?;
+    Some(Value::from(path.is_file().then_some(path)?.to_str()?))
 }

@@ -53,6 +53,7 @@
 //! | `text` | sentence for users, where it has to differ from the documentation comment |
 //! | `used_with` | condition on other settings under which the setting has an effect, as `"profile = constant or sine"`; it is added to that of the structure, whose name `~` stands for |
 //! | `input`, `output`, `local` | the value is no setting, but an input, an output or a local variable of a model |
+//! | `file` | the value is no parameter of a model: a file of values sets it, see [`read_file`] |
 //! | `discrete` | it changes at events or communication points only |
 //! | `optional` | the input may stay unconnected |
 //! | `derivative` | name of the state whose time derivative the value is |
@@ -78,7 +79,7 @@ pub use access::{Field, Number, Numbered, Settings};
 pub use check::{Invalid, check, names};
 pub use choice::{Choice, Items};
 pub use place::{About, Entry, Place, Role};
-pub use read::{Misread, change, read};
+pub use read::{Misread, change, read, read_file};
 pub use settings_derive::{Choice, Declared};
 
 use nalgebra::SMatrix;

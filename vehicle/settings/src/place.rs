@@ -17,6 +17,8 @@ pub enum Role {
     Output,
     /// It is computed for observation only.
     Local,
+    /// It is set by a file alone, for those who tune a model.
+    File,
 }
 
 /// Declarations in the attribute of a field.

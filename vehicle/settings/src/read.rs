@@ -1,6 +1,6 @@
 //! Values from files.
 
-use crate::{Declared, Field, Kind, Settings, settings};
+use crate::{Declared, Field, Kind, Place, Role, Settings, settings};
 use toml::{Table, Value};
 
 /// A value of a file that cannot be that of a setting.
@@ -25,6 +25,26 @@ pub fn read<S: Declared>(value: &mut S, table: &Table) -> Result<(), Misread> {
     flatten("", table, &mut entries);
     for (name, entry) in entries {
         set(value, &list, &name, &entry).map_err(|problem| Misread { name, problem })?;
+    }
+    Ok(())
+}
+
+/// Sets settings as [`read`] does, from the text of a file that may name only settings which are
+/// declared with `file`.
+///
+/// # Errors
+/// Says where the text is no TOML, or returns the first name or value that no such setting can take.
+pub fn read_file<S: Declared>(value: &mut S, text: &str) -> Result<(), String> {
+    let table: Table = toml::from_str(text).map_err(|error| error.to_string())?;
+    let list = settings::<S>();
+    let mut entries = Vec::new();
+    flatten("", &table, &mut entries);
+    for (name, entry) in entries {
+        let is_other = |place: &Place| place.name == name && place.role != Role::File;
+        if list.iter().any(|setting| is_other(&setting.place)) {
+            return Err(format!("{name} is a variable: set it as one"));
+        }
+        set(value, &list, &name, &entry).map_err(|problem| format!("{name}: {problem}"))?;
     }
     Ok(())
 }

@@ -102,8 +102,8 @@ impl Table {
     /// Refuses a table that is not full, that holds a value which is not finite, or whose axes do
     /// not increase. The message begins with the key at fault.
     pub(super) fn check(&self) -> Result<(), String> {
-        increasing("alpha_deg", &self.alpha_deg)?;
-        increasing("mach", &self.mach)?;
+        increasing("alpha_deg", &self.alpha_deg, TURN)?;
+        increasing("mach", &self.mach, [0.0, f64::MAX])?;
         let (rows, columns) = (self.mach.len(), self.alpha_deg.len());
         if self.values.len() != rows {
             let found = self.values.len();
@@ -139,10 +139,19 @@ impl Table {
     }
 }
 
-/// Refuses an axis of a table whose values are not finite, or do not increase.
-pub(super) fn increasing(name: &str, axis: &[f64]) -> Result<(), String> {
+/// Range of angles of attack and deflections, deg.
+pub(super) const TURN: [f64; 2] = [-180.0, 180.0];
+
+/// Refuses an axis of a table whose values are not finite, are out of their range, or do not
+/// increase.
+pub(super) fn increasing(name: &str, axis: &[f64], [low, high]: [f64; 2]) -> Result<(), String> {
     if axis.is_empty() || !axis.iter().all(|value| value.is_finite()) {
         return Err(format!("{name} must hold finite values, one at least"));
+    }
+    if let Some(value) = axis.iter().find(|value| !(low..=high).contains(*value)) {
+        let bound = if *value < low { "at least" } else { "at most" };
+        let end = if *value < low { low } else { high };
+        return Err(format!("{name} holds {value}, which must be {bound} {end}"));
     }
     match axis.windows(2).find(|pair| pair[0] >= pair[1]) {
         Some([before, after, ..]) => {
@@ -183,6 +192,19 @@ impl Coefficient {
     /// Returns whether the numbers are those of a derivative per degree.
     pub(crate) fn is_per_degree(&self) -> bool {
         self.per_degree
+    }
+
+    /// Returns a negative value within the table, or of the polynomial between 0 and 50 degrees,
+    /// after its key.
+    pub(crate) fn negative(&self) -> Option<(&'static str, f64)> {
+        let (key, values): (_, Vec<f64>) = match &self.curve {
+            Curve::Polynomial(factors) => {
+                let at = |alpha: i32| polynomial(factors, f64::from(alpha));
+                ("polynomial", (0..=50).map(at).collect())
+            }
+            Curve::Table(table) => ("table.values", table.values.concat()),
+        };
+        values.into_iter().find(|value| *value < 0.0).map(|value| (key, value))
     }
 
     /// Returns whether the coefficient was left out.

@@ -1,7 +1,7 @@
 //! Moments of single surfaces as tables over angle of attack, Mach number and deflection.
 
 use super::Flow;
-use super::coefficient::{Table, increasing, place};
+use super::coefficient::{TURN, Table, increasing, place};
 use crate::given;
 use serde::{Deserialize, Serialize};
 
@@ -64,7 +64,7 @@ impl SurfaceTable {
     /// reference length of the axis, m³.
     pub(crate) fn new(given: GivenTable, surface: usize, volume: f64) -> Result<Self, String> {
         let GivenTable { axis, alpha_deg, mach, deflection_deg, values, .. } = given;
-        increasing("deflection_deg", &deflection_deg)?;
+        increasing("deflection_deg", &deflection_deg, TURN)?;
         if values.len() != deflection_deg.len() {
             let (found, wanted) = (values.len(), deflection_deg.len());
             return Err(format!(
@@ -113,6 +113,6 @@ impl SurfaceTable {
             && self.axis < 3
             && self.volume.is_finite()
             && self.tables.len() == self.deflections.len()
-            && increasing("", &self.deflections).is_ok()
+            && increasing("", &self.deflections, TURN).is_ok()
     }
 }

@@ -1,7 +1,6 @@
 //! Configuration of a plant.
 
 use crate::actuators::{self};
-use crate::calibration::Sequence;
 use crate::disturbance::Disturbance;
 use crate::dynamics::Inertia;
 use crate::entry;
@@ -10,7 +9,6 @@ use crate::platform::Surroundings;
 use crate::sensors::{self};
 use crate::state::State;
 use crate::turntable::{self};
-use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// Configuration that determines the motion of a plant, apart from the inputs.
@@ -40,8 +38,6 @@ pub struct Config {
     /// Step (N m) of the converter that the input moment passes; 0 for none. A converted moment is
     /// held over each communication step.
     pub moment_resolution: f64,
-    /// Prescribed motion that starts at the initial angles and replaces the dynamics.
-    pub calibration: Option<Sequence>,
     /// Gravity and magnetic field that the sensors measure.
     pub surroundings: Surroundings,
     /// Configuration of sampled sensors; without it the plant outputs the readings of ideal
@@ -51,11 +47,4 @@ pub struct Config {
     pub turntable: turntable::Config,
     /// Longest step of the integration, s.
     pub step: f64,
-}
-
-/// Prescribed motion that replaces the dynamics.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Calibration {
-    pub(super) sequence: Sequence,
-    pub(super) initial: Vector3<f64>,
 }

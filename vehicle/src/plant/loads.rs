@@ -1,6 +1,5 @@
 //! Inputs of the plant, and the moments and derivatives that follow from them.
 
-use super::config::Calibration;
 use super::equations::{self, Load, Partials};
 use super::{Entering, Held, Plant};
 use crate::actuators::{Actuators, Command, Conditions, Drive};
@@ -34,9 +33,7 @@ pub struct Input {
     pub prescribed: Prescribed,
     /// Angle of attack at which the vehicle is trimmed.
     #[setting(name = "trim.alpha", unit = "rad", nominal = 0.1)]
-    #[setting(
-        used_with = "translation = entry and aerodynamics.vehicle = papers and aerodynamics.trim = input"
-    )]
+    #[setting(used_with = "translation = entry and aerodynamics.trim = input")]
     pub trim: f64,
 }
 
@@ -143,8 +140,7 @@ impl Plant {
             .map_or_else(SMatrix::zeros, |actuators| actuators.moment_by_jets(command))
     }
 
-    /// Trajectory: that of the entry flight, or the input. Also its turn rate (rad/s), which is
-    /// zero during the calibration sequence.
+    /// Trajectory: that of the entry flight, or the input. Also its turn rate (rad/s).
     pub(super) fn trajectory(
         &self,
         entering: Option<&Entering>,
@@ -152,9 +148,6 @@ impl Plant {
     ) -> (Trajectory, Vector3<f64>) {
         if let Some(entering) = entering {
             return (entering.trajectory, entering.turn_rate);
-        }
-        if self.calibration.is_some() {
-            return (input.trajectory, Vector3::zeros());
         }
         (input.trajectory, input.trajectory.turn_rate(self.earth_rate))
     }
@@ -180,16 +173,6 @@ impl Plant {
         }
     }
 
-    /// State derivative at `time` (s) for a given state.
-    pub(super) fn derivative_at(&self, time: f64, state: &State, load: &Load) -> State {
-        match &self.calibration {
-            None => equations::derivative(&self.body, self.kinematics, state, load),
-            Some(Calibration { sequence, initial }) => {
-                sequence.state_at(self.kinematics, initial, time - self.start_time).1
-            }
-        }
-    }
-
     /// Derivative of the attitude and the rates at `time` (s) for the present state, during an
     /// entry flight if there is one.
     pub fn derivative(
@@ -203,7 +186,7 @@ impl Plant {
             return self.turned(entry, entering, (time, 0.0), &self.state, (input, held));
         }
         let load = self.load((time, 0.0), self.state[0], input, held);
-        self.derivative_at(time, &self.state, &load)
+        equations::derivative(&self.body, self.kinematics, &self.state, &load)
     }
 
     /// Partial derivatives of [`Plant::derivative`] without an entry flight, and those of the turn
@@ -215,11 +198,8 @@ impl Plant {
         held: &Held,
     ) -> (Partials, SMatrix<f64, 3, TRAJECTORY>) {
         let load = self.load((time, 0.0), self.state[0], input, held);
-        let mut partials =
+        let partials =
             equations::partial_derivatives(&self.body, self.kinematics, &self.state, &load);
-        if self.calibration.is_some() {
-            partials = Partials::default();
-        }
         (partials, input.trajectory.turn_rate_by_fields(self.earth_rate))
     }
 }

@@ -1,12 +1,12 @@
 //! Makes a plant from its configuration, which it checks.
 
 use super::Plant;
-use super::config::{Calibration, Config};
+use super::config::Config;
 use crate::actuators::{self, Actuators};
 use crate::effectors::Surfaces;
 use crate::error::{Error, finite, not_negative, positive};
 use crate::sensors::Sensors;
-use crate::state::{BETA_LIMIT, angles};
+use crate::state::BETA_LIMIT;
 use crate::time::check_resolution;
 use crate::transport::Transport;
 use crate::turntable::Turntable;
@@ -69,12 +69,6 @@ impl Plant {
                 Actuators::new(&actuators::Config { dynamic_pressure: 1.0, ..actuators.clone() })
             }
         };
-        let initial = angles(&config.initial);
-        let mut state = config.initial;
-        if let Some(sequence) = &config.calibration {
-            sequence.check(&initial)?;
-            (state, _) = sequence.state_at(config.kinematics, &initial, 0.0);
-        }
         Ok(Self {
             body,
             kinematics: config.kinematics,
@@ -83,7 +77,6 @@ impl Plant {
             actuators: config.actuators.as_ref().map(actuators).transpose()?,
             transport,
             moment_resolution: resolution,
-            calibration: config.calibration.map(|sequence| Calibration { sequence, initial }),
             surroundings: config.surroundings,
             sensors: config
                 .sensors
@@ -98,7 +91,7 @@ impl Plant {
             start_time,
             held: None,
             noise: None,
-            state,
+            state: config.initial,
             motion: config.motion,
             deflections: Surfaces::zeros(),
         })
@@ -146,7 +139,6 @@ impl Plant {
             && self.disturbance == other.disturbance
             && self.actuators == other.actuators
             && self.moment_resolution == other.moment_resolution
-            && self.calibration == other.calibration
             && self.surroundings == other.surroundings
             && self.entry == other.entry
             && self.origin == other.origin
@@ -159,10 +151,6 @@ impl Plant {
 fn check_motion(config: &Config) -> Result<(), Error> {
     if let Some(entry) = &config.entry {
         entry.check(&config.motion)?;
-        if config.calibration.is_some() {
-            let problem = "prescribes the attitude, which an entry flight does not allow";
-            return Err(Error::parameter("calibration.active", problem));
-        }
         return Ok(());
     }
     finite("flight", &config.motion)

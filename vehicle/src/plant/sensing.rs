@@ -2,7 +2,7 @@
 //! output.
 
 use super::equations::angle_rates;
-use super::{Entering, Held, Input, Load, Plant, angles};
+use super::{Entering, Held, Input, Plant};
 use crate::fixes::Fixes;
 use crate::frames::Place;
 use crate::kinematics::sines;
@@ -16,7 +16,7 @@ impl Plant {
     pub(super) fn sense(&mut self, time: f64, input: &Input) {
         let Some(mut sensors) = self.sensors.take() else { return };
         let entering = self.entering(time);
-        let vehicle = self.pose(entering.as_ref(), time, input);
+        let vehicle = self.pose(entering.as_ref(), input);
         sensors.take(time, self.felt_by(&sensors, entering.as_ref(), (time, input), &vehicle));
         if let (Some(turntable), Some(at)) = (&mut self.turntable, sensors.due(time)) {
             turntable.follow(at, &vehicle);
@@ -24,15 +24,12 @@ impl Plant {
         self.sensors = Some(sensors);
     }
 
-    fn pose(&self, entering: Option<&Entering>, time: f64, input: &Input) -> Pose {
+    fn pose(&self, entering: Option<&Entering>, input: &Input) -> Pose {
         let (trajectory, turn_rate) = self.trajectory(entering, input);
-        let angle_rates = if self.calibration.is_some() {
-            angles(&self.derivative_at(time, &self.state, &Load::default()))
-        } else {
-            let sines = entering.map_or_else(|| sines(&self.angles()), |entering| entering.sines);
-            let (matrix, _) = self.kinematics.r_and_inverse(&sines);
-            angle_rates(self.kinematics, &matrix, (&sines, &self.rates()), &turn_rate)
-        };
+        let sines = entering.map_or_else(|| sines(&self.angles()), |entering| entering.sines);
+        let (matrix, _) = self.kinematics.r_and_inverse(&sines);
+        let angle_rates =
+            angle_rates(self.kinematics, &matrix, (&sines, &self.rates()), &turn_rate);
         Pose {
             kinematics: self.kinematics,
             angles: self.angles(),
@@ -45,7 +42,7 @@ impl Plant {
 
     /// Readings of ideal sensors at `time` (s).
     pub fn felt(&self, time: f64, input: &Input) -> Readings {
-        self.pose(self.entering(time).as_ref(), time, input).felt(&self.surroundings)
+        self.pose(self.entering(time).as_ref(), input).felt(&self.surroundings)
     }
 
     /// Readings without errors that the sampled sensors take at `time` (s): in the pose of the
@@ -73,7 +70,7 @@ impl Plant {
     /// Newest sample that the sensors output at `time` (s), including one that is due then but not
     /// yet taken. Without sampled sensors it holds the readings of ideal ones and the number 0.
     pub fn measured(&self, entering: Option<&Entering>, time: f64, input: &Input) -> Sample {
-        let vehicle = self.pose(entering, time, input);
+        let vehicle = self.pose(entering, input);
         let Some(sensors) = &self.sensors else {
             let readings = vehicle.felt(&self.surroundings);
             return Sample { number: 0, time, readings, fixes: Fixes::default() };
@@ -107,7 +104,7 @@ impl Plant {
         let (partials, turn_rate_by_trajectory) = self.partial_derivatives(time, input, held);
         let by_state = partials.by_state.fixed_rows::<1>(0).into_owned();
         let by_trajectory = partials.by_turn_rate.fixed_rows::<1>(0) * turn_rate_by_trajectory;
-        let pose = self.pose(None, time, input);
+        let pose = self.pose(None, input);
         pose.felt_by_state_and_trajectory(&self.surroundings, &by_state, &by_trajectory)
     }
 }

@@ -56,7 +56,16 @@ fn every_fault_has_its_file_line_and_key() {
         ("polynomial = [0.1]", "", "[forces.drag]", "either polynomial or table"),
         ("[10.0, 20.0], mach", "[20.0], mach", "table =", "moments.pitch.table: values: row 1"),
         ("min_deg = [-20.0, -30.0]", "min_deg = [-20.0]", "min_deg", "surfaces.min_deg has 1"),
-        ("min_deg = [-20.0, -30.0]", "min_deg = [1.0, -30.0]", "min_deg", "finite and hold 0"),
+        ("min_deg = [-20.0, -30.0]", "min_deg = [-5e3, -30.0]", "min_deg", "within 180 degrees"),
+        ("[2.0, 10.0]", "[-2.0, 10.0]", "mach", "mach holds -2, which must be at least 0"),
+        ("[0.0, 20.0]", "[0.0, 5e3]", "alpha_deg", "holds 5000, which must be at most 180"),
+        (
+            "polynomial = [0.1]",
+            "polynomial = [0.1, -0.01]",
+            "polynomial = [0.1, -0.01]",
+            "forces.drag.polynomial gives",
+        ),
+        ("min_deg = [-20.0, -30.0]", "min_deg = [1.0, -30.0]", "min_deg", "must hold 0"),
         ("rate_deg_s = [20.0,", "rate_deg_s = [0.0,", "rate_deg_s", "'flap' must be positive"),
         ("surface = \"flap\"", "surface = \"flop\"", "surface", "there is no 'flop'"),
         ("axis = \"pitch\"", "axis = \"nod\"", "axis", "nod"),
@@ -73,6 +82,16 @@ fn every_fault_has_its_file_line_and_key() {
         assert!(text.starts_with(&format!("my.toml, line {}: ", lines + 2)), "{to}: {text}");
         assert!(text.contains(named), "{to}: {text}");
     }
+}
+
+#[test]
+fn shipped_vehicles_have_the_inertia_of_their_papers() {
+    let inertia = |name: &str| Vehicle::read(Path::new(name)).unwrap().inertia;
+    assert_eq!(inertia("chai2022"), Scenario::crmpc2022().inertia);
+    assert_eq!(inertia("wu2015"), Scenario::tvsmc2015().inertia);
+    assert_eq!(inertia("jia"), Scenario::two_loop().inertia);
+    assert!(SHIPPED.iter().all(|name| Vehicle::shipped(name).is_some_and(|it| it.fits())));
+    assert_eq!(Vehicle::shipped("chai"), None);
 }
 
 #[test]

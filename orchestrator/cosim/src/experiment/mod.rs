@@ -45,6 +45,8 @@ pub struct Experiment {
     pub simulation: Simulation,
     /// Components of the experiment, each an FMU with its settings, by name.
     pub components: BTreeMap<String, Component>,
+    /// Vehicle that is flown.
+    pub vehicle: Option<Flown>,
     /// Connections from outputs to inputs.
     #[serde(default)]
     pub connections: Vec<Connection>,
@@ -131,6 +133,16 @@ pub struct Component {
     /// variables and unconnected inputs that it does not have are left out.
     #[serde(default, rename = "exchanged")]
     pub is_exchanged: bool,
+}
+
+/// The vehicle of an experiment.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Flown {
+    /// File of the vehicle, or name of a shipped one: every component that has the parameter
+    /// `vehicle.file`, and does not set it itself, reads it.
+    #[schemars(with = "String")]
+    pub file: Spanned<String>,
 }
 
 /// The value of a parameter as the JSON Schema describes it: a number, a text or a truth value.

@@ -87,6 +87,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
 
     let components = structure.components.iter().zip(parameters);
     let mut experiment = Experiment {
+        vehicle: None,
         title: root.attribute("name").unwrap_or("system").to_string(),
         description: root.attribute("description").unwrap_or_default().to_string(),
         simulation: simulation(&root, &parts, overrides, &refuse)?,

@@ -67,6 +67,7 @@ impl Keys {
                     "input" => keys.role = Some(format_ident!("Input")),
                     "output" => keys.role = Some(format_ident!("Output")),
                     "local" => keys.role = Some(format_ident!("Local")),
+                    "file" => keys.role = Some(format_ident!("File")),
                     "derivative" => keys.derivative = Some(meta.value()?.parse()?),
                     "depends_on" => keys.depends_on = Some(list(meta.value()?)?),
                     _ => return Err(meta.error("no key of #[setting(…)]")),
