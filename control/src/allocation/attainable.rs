@@ -34,7 +34,7 @@ pub fn largest_ball(effectors: &[Reach], offset: &Vector3<f64>) -> Ball {
         for (second, ..) in &effectors[i + 1..] {
             let normal = first.cross(second);
             let length = normal.norm();
-            if !(length > 0.0) {
+            if length <= 0.0 {
                 continue;
             }
             let at_offset = normal.dot(offset);

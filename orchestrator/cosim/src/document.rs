@@ -96,7 +96,9 @@ impl Source {
                 Value::String(file) if file.contains('.') && !file.contains('\n') => {
                     let path = std::path::absolute(self.beside(Path::new(&file)));
                     if let Some(path) = path.ok().filter(|path| path.is_file()) {
-                        text = text.replace(&format!("\"{file}\""), &format!("{path:?}"));
+                        // On Windows a path holds backslashes.
+                        let path = path.display().to_string().replace('\\', "/");
+                        text = text.replace(&format!("\"{file}\""), &format!("\"{path}\""));
                     }
                 }
                 _ => {}
