@@ -32,7 +32,7 @@ def listed() -> list[dict]:
 
 # Experiments whose description announces the warning.
 MEANT_TO_WARN = {
-    "entry/told": ["less than a tenth of limit.moment"],
+    "entry/known-moments": ["less than a tenth of limit.moment"],
     "attainable": ["the guarantee is not in force"],
 }
 

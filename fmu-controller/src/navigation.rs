@@ -154,9 +154,6 @@ impl SampledInstance for NavigationInstance {
         ticks: &mut Ticks<Self>,
     ) -> Result<(), Failure> {
         let line = self.input.line();
-        if let Some(name) = line.fault() {
-            return Err(Failure::Error(format!("an input {name} is not a finite number")));
-        }
         let time = ticks.next_time();
         ticks.evaluate_with(line, |memory, _| navigation.update(memory, time, &line));
         Ok(())

@@ -45,7 +45,10 @@ pub struct Fault {
     #[setting(name = "", part, used_with = "~.kind != none")]
     pub window: Window,
     /// Size as a multiple of that of its kind.
-    #[setting(part, nominal = 1.0, used_with = "~.kind != none")]
+    #[setting(part, nominal = 1.0)]
+    #[setting(
+        used_with = "~.kind = late or clock or position or velocity or attitude or gyroscope or accelerometer"
+    )]
     pub size: f64,
 }
 

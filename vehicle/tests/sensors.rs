@@ -2,10 +2,12 @@
 //! statistics of the noise.
 
 use nalgebra::{Matrix3, Vector3};
+use vehicle::fault::{Fault, FaultKind};
 use vehicle::fixes::Devices;
+use vehicle::frames::Place;
 use vehicle::platform::Readings;
 use vehicle::sensor_data::SensorData;
-use vehicle::sensors::{Config, IN_FLIGHT, Line, PerSensor, Sample, Sensors};
+use vehicle::sensors::{Config, Felt, IN_FLIGHT, Line, PerSensor, Sample, Sensors};
 use vehicle::triad::{Triad, Window};
 
 const PERIOD: f64 = 1.0 / 128.0;
@@ -330,6 +332,84 @@ fn a_frozen_sensor_repeats_its_value_while_the_samples_count_on() {
     let mut sensors = with(|config| config.triads[0].freeze = Window { start: 0.0, end: 1.0 });
     let samples = run(&mut sensors, 4, |time| uniform(1.0 + time));
     assert!(samples.iter().all(|sample| sample.readings[0] == Vector3::repeat(1.0)));
+}
+
+/// Sensors with a fix a second of a receiver and a star tracker, of which one or the inertial unit
+/// has a fault from 3 s to 5 s.
+fn with_fault(device: usize, kind: FaultKind, size: f64) -> Config {
+    let mut config = ideal();
+    let devices = &mut config.devices;
+    (devices.gnss.position_noise, devices.gnss.velocity_noise) = (0.0, 0.0);
+    (devices.star.noise, devices.star.period) = (0.0, 1.0);
+    let fault = Fault { kind, window: Window { start: 3.0, end: 5.0 }, size };
+    *[&mut devices.gnss.fault, &mut devices.star.fault, &mut devices.inertial][device] = fault;
+    config
+}
+
+/// Their samples at 1024 ticks, 8 s, while they move.
+fn faulty(device: usize, kind: FaultKind, size: f64) -> Vec<Sample> {
+    let mut sensors = Sensors::new(&with_fault(device, kind, size), 0.0).unwrap();
+    let take = |k: u32| {
+        let time = f64::from(k) * PERIOD;
+        let position = Vector3::new(7e6 + time, 0.0, 0.0);
+        let place = Place { position, velocity: Vector3::x(), ..Place::default() };
+        sensors.take(time, Felt { readings: uniform(time), place: Some((place, 1e5)) });
+        sensors.arrived()
+    };
+    (0..1024).map(take).collect()
+}
+
+#[test]
+fn oracle_each_fault_acts_in_its_window() {
+    use FaultKind::{Accelerometer, Attitude, Clock, Dropout, Frozen, Gyroscope, Late, Position};
+    let at = |samples: &[Sample], time: f64| samples[(time / PERIOD) as usize];
+    let good = faulty(0, FaultKind::None, 1.0);
+    let number = |device: usize, sample: &Sample| {
+        [sample.fixes.gnss.number, sample.fixes.star.number, sample.number][device]
+    };
+    for device in 0..3 {
+        for kind in [Frozen, Dropout, Late, Clock, FaultKind::Restart] {
+            let bad = faulty(device, kind, 1.0);
+            let name = format!("{kind:?} of device {device}");
+            assert_eq!(at(&bad, 2.99), at(&good, 2.99), "{name}");
+            if !matches!(kind, FaultKind::Restart) && !(device < 2 && kind == Dropout) {
+                assert_eq!(at(&bad, 6.5), at(&good, 6.5), "{name}");
+            }
+            let (now, sound) = (at(&bad, 4.1), at(&good, 4.1));
+            let [arrived, due] = [&now, &sound].map(|sample| number(device, sample));
+            let missing = match (kind, device) {
+                (Dropout, 2) => (1.1 / PERIOD) as i32,
+                (Dropout, _) => 2,
+                (Late, 2) => (0.2 / PERIOD) as i32,
+                (Late, _) => 1,
+                (FaultKind::Restart, 2) => 384,
+                (FaultKind::Restart, _) => 3,
+                _ => 0,
+            };
+            assert!(
+                (due - arrived - missing).abs() <= 1 - i32::from(device < 2),
+                "{name}: {arrived}"
+            );
+            assert_ne!(now, sound, "{name}");
+        }
+    }
+    let off =
+        |bad: &[Sample]| at(bad, 4.1).fixes.gnss.position - at(&good, 4.1).fixes.gnss.position;
+    let moved = off(&faulty(0, Position, 2.0)).map(f64::abs);
+    assert!((moved - Vector3::repeat(1000.0)).norm() < 1e-6, "{moved}");
+    let turned = at(&faulty(1, Attitude, 1.0), 4.1).fixes.star.rotation().unwrap().angle();
+    assert!((turned.to_degrees() - 0.5 * 3_f64.sqrt()).abs() < 1e-9, "{turned}");
+    for (i, kind, unit) in [(0, Gyroscope, 100_f64.to_radians() / 3600.0), (1, Accelerometer, 0.5)]
+    {
+        let change = at(&faulty(2, kind, 2.0), 4.1).readings[i] - at(&good, 4.1).readings[i];
+        assert!((change - Vector3::repeat(2.0 * unit)).norm() < 1e-12, "{change}");
+    }
+    for (device, kind, size) in
+        [(0, Attitude, 1.0), (1, Gyroscope, 1.0), (0, Late, 6.0), (2, Clock, f64::NAN)]
+    {
+        let config = with_fault(device, kind, size);
+        assert!(Sensors::new(&config, 0.0).is_err(), "{kind:?} of device {device}");
+    }
 }
 
 #[test]

@@ -60,22 +60,16 @@ impl State {
     }
 }
 
-/// Returns the state at `time` (s) between two states: a cubic through both positions and
-/// velocities, and a rotation at a constant rate.
+/// Returns the state at `time` (s) between two states, with a constant acceleration and rate.
 fn between(from: &(f64, State), to: &(f64, State), time: f64) -> State {
-    let length = to.0 - from.0;
-    if length <= 0.0 {
-        return to.1;
-    }
-    let share = (time - from.0) / length;
     let (a, b) = (&from.1, &to.1);
-    let chord = b.position - a.position;
-    let [early, late] = [a.velocity * length - chord, b.velocity * length - chord];
-    let bend = share * (1.0 - share);
+    let elapsed = time - from.0;
+    let share = if to.0 > from.0 { elapsed / (to.0 - from.0) } else { 0.0 };
+    let velocity = a.velocity + (b.velocity - a.velocity) * share;
     let turn = (a.attitude.inverse() * b.attitude).scaled_axis();
     State {
-        position: a.position + chord * share + (early * (1.0 - share) - late * share) * bend,
-        velocity: a.velocity + (b.velocity - a.velocity) * share,
+        position: a.position + (a.velocity + velocity) * (elapsed / 2.0),
+        velocity,
         attitude: a.attitude * UnitQuaternion::from_scaled_axis(turn * share),
     }
 }

@@ -226,22 +226,17 @@ impl Navigation {
             return;
         }
         watch.refused += 1;
-        let refused = watch.refused;
-        if matches!(source, Source::Gnss | Source::Star) {
-            running.rejected += 1;
-        }
-        if refused < RUN {
+        running.rejected += u32::from(size > 1);
+        if watch.refused < RUN {
             return;
         }
-        running.watches[source as usize].refused = 0;
+        watch.refused = 0;
+        let has_jumped = watch.jumped;
         match source {
-            Source::Gnss => {
-                if !self.explain_by_clock(running, measured, gate) {
-                    self.restart(running, measured, POSITION, source);
-                }
-            }
+            Source::Gnss if self.explain_by_clock(running, measured, gate) => {}
+            Source::Gnss => self.restart(running, measured, POSITION, source),
             // The gyroscope does not jump: a star tracker that does is wrong, and not the filter.
-            Source::Star if running.watches[source as usize].jumped => {}
+            Source::Star if has_jumped => {}
             Source::Star => self.restart(running, measured, ATTITUDE, source),
             Source::Side => widen(&mut running.covariance, WIND..DRAG),
             Source::Drag => widen(&mut running.covariance, DRAG..CLOCK),

@@ -28,23 +28,8 @@ impl Line {
     /// Returns whether there are readings, and they can be those of a vehicle.
     pub(super) fn is_plausible(&self) -> bool {
         let is_there = self.sample > 0 || self.rate.amax() > 0.0 || self.force.amax() > 0.0;
-        is_there && self.rate.amax() <= LARGEST[0] && self.force.amax() <= LARGEST[1]
-    }
-
-    /// Returns the name of the inputs that hold a value that is not finite.
-    pub fn fault(&self) -> Option<&'static str> {
-        let Fixes { gnss, star } = &self.fixes;
-        let broken = |values: &[f64]| values.iter().any(|value| !value.is_finite());
-        let vectors = |vectors: [&Vector3<f64>; 2], time: f64| {
-            vectors.iter().any(|vector| broken(vector.as_slice())) || broken(&[time])
-        };
-        if vectors([&self.rate, &self.force], self.time) {
-            Some("measured.*")
-        } else if vectors([&gnss.position, &gnss.velocity], gnss.time) {
-            Some("gnss.*")
-        } else {
-            (broken(&star.attitude) || broken(&[star.time])).then_some("star.*")
-        }
+        let within = |vector: &Vector3<f64>, most: f64| vector.iter().all(|v| v.abs() <= most);
+        is_there && within(&self.rate, LARGEST[0]) && within(&self.force, LARGEST[1])
     }
 }
 
