@@ -1,7 +1,7 @@
 //! Tests of the sensors and their line, effect by effect, against values computed by hand and the
 //! statistics of the noise.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use vehicle::fault::{Fault, FaultKind};
 use vehicle::fixes::Devices;
 use vehicle::frames::Place;
@@ -352,7 +352,8 @@ fn faulty(device: usize, kind: FaultKind, size: f64) -> Vec<Sample> {
     let take = |k: u32| {
         let time = f64::from(k) * PERIOD;
         let position = Vector3::new(7e6 + time, 0.0, 0.0);
-        let place = Place { position, velocity: Vector3::x(), ..Place::default() };
+        let attitude = UnitQuaternion::from_scaled_axis(Vector3::x() * (0.01 * time));
+        let place = Place { position, velocity: Vector3::x(), attitude };
         sensors.take(time, Felt { readings: uniform(time), place: Some((place, 1e5)) });
         sensors.arrived()
     };
@@ -397,7 +398,8 @@ fn oracle_each_fault_acts_in_its_window() {
         |bad: &[Sample]| at(bad, 4.1).fixes.gnss.position - at(&good, 4.1).fixes.gnss.position;
     let moved = off(&faulty(0, Position, 2.0)).map(f64::abs);
     assert!((moved - Vector3::repeat(1000.0)).norm() < 1e-6, "{moved}");
-    let turned = at(&faulty(1, Attitude, 1.0), 4.1).fixes.star.rotation().unwrap().angle();
+    let seen = |samples: &[Sample]| at(samples, 4.1).fixes.star.rotation().unwrap();
+    let turned = seen(&faulty(1, Attitude, 1.0)).angle_to(&seen(&good));
     assert!((turned.to_degrees() - 0.5 * 3_f64.sqrt()).abs() < 1e-9, "{turned}");
     for (i, kind, unit) in [(0, Gyroscope, 100_f64.to_radians() / 3600.0), (1, Accelerometer, 0.5)]
     {
