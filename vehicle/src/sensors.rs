@@ -152,7 +152,7 @@ struct Taken {
     stamp: f64,
     memories: [Memory; 3],
     /// Latest fixes that were taken, and those that have arrived.
-    taken: Fixes,
+    seen: Fixes,
     fixes: Fixes,
     dropped: bool,
 }
@@ -328,12 +328,12 @@ impl Sensors {
             triad.sample(at.time, &felt.readings[i], &draws[i], before)
         });
         let [earlier, mut fixes] =
-            before.map_or_else(Default::default, |before| [before.taken, before.fixes]);
-        let mut taken = earlier;
+            before.map_or_else(Default::default, |before| [before.seen, before.fixes]);
+        let mut seen = earlier;
         if let Some((place, altitude)) = &felt.place {
             let times = (at.time, at.time - self.start, line.period);
-            taken = devices.taken((*seed, at.tick), times, (place, *altitude), &earlier);
-            fixes = devices.arrived(at.time, [&earlier, &taken], &fixes);
+            seen = devices.taken((*seed, at.tick), times, (place, *altitude), &earlier);
+            fixes = devices.arrived(at.time, [&earlier, &seen], &fixes);
         }
         let dropped = line.drop_window.holds(at.time) && chance < line.drop_probability
             || fault.is(FaultKind::Dropout, at.time);
@@ -343,7 +343,7 @@ impl Sensors {
             None => at.tick + 1,
         };
         let stamp = at.time + fault.of(FaultKind::Clock, at.time);
-        Taken { at, number, stamp, memories, taken, fixes, dropped }
+        Taken { at, number, stamp, memories, seen, fixes, dropped }
     }
 
     fn slot(&self, tick: i64) -> usize {

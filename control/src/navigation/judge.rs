@@ -13,117 +13,21 @@ use super::filter::{
 use super::line::Contradiction;
 use super::running::{Running, Source};
 use super::strapdown::{State, rotation};
+use super::watch::{DEPARTURE, FORGOTTEN, RUN};
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use vehicle::fixes::{GnssFix, StarFix};
 use vehicle::frames::fixed_from_inertial;
-use vehicle::math::exp;
 
-/// Measurements in a row that show that the filter is wrong, or that a device agrees with itself
-/// again.
-const RUN: u32 = 5;
-/// Times over which innovations are averaged, s.
-const WINDOWS: [f64; 3] = [1.0, 10.0, 60.0];
-/// Number of standard deviations by which such an average may exceed 1.
-const SURPRISE: f64 = 6.0;
-/// Square beyond which an innovation counts no more: one outlier is forgotten within ten seconds.
-const LARGEST: f64 = 25.0;
 /// Greatest offset of the receiver's clock that is estimated, and greatest time by which a state is
 /// extrapolated to that of a measurement, s.
 const CLOCK_RANGE: f64 = 0.25;
-/// Multiple of the noise of a fix, and share of the way, by which the positions of a receiver may
-/// depart from its velocities; time over which the departure is forgotten, s.
-const DEPARTURE: [f64; 2] = [6.0, 1e-3];
-const FORGOTTEN: f64 = 30.0;
 /// Time without a contradiction after which the filter counts as right again, s.
 const RECOVERY: f64 = 60.0;
 /// Factor by which standard deviations grow that have turned out too small.
 const GROWTH: f64 = 4.0;
 /// Standard deviations of the estimates of drag, wind, biases from which they are implausible.
 const IMPLAUSIBLE: [f64; 3] = [4.0, 3.0, 5.0];
-
-/// Measurements of one source so far.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Watch {
-    /// Time of the last one, s.
-    at: f64,
-    /// Number in a row that contradicted the filter, and that agreed among themselves.
-    refused: u32,
-    agreed: u32,
-    /// Whether the device has contradicted itself since it last agreed with the filter.
-    jumped: bool,
-    /// Averages of the squares of the normalised innovations per component over [`WINDOWS`].
-    averages: [f64; 3],
-    /// Number of components of a measurement.
-    size: usize,
-}
-
-impl Default for Watch {
-    fn default() -> Self {
-        Self {
-            at: f64::NEG_INFINITY,
-            refused: 0,
-            agreed: RUN,
-            jumped: false,
-            averages: [1.0; 3],
-            size: 1,
-        }
-    }
-}
-
-impl Watch {
-    /// Notes the squares of normalised innovations at `time` (s).
-    fn note(&mut self, time: f64, squares: f64, size: usize) {
-        // A gap counts as a second.
-        let elapsed = (time - self.at).clamp(0.0, 1.0);
-        (self.at, self.size) = (time, size);
-        for (average, window) in self.averages.iter_mut().zip(WINDOWS) {
-            *average += (squares.min(LARGEST) - *average) * (1.0 - exp(-elapsed / window));
-        }
-    }
-
-    /// Returns whether the innovations are larger than chance makes them. The mean of n squares has
-    /// the variance 2/n, and the weights of an average over a time T are those of (2 − a)/a
-    /// measurements, with a the weight of one, if they come once a second.
-    fn is_surprised(&self) -> bool {
-        self.averages.iter().zip(WINDOWS).any(|(average, window)| {
-            let weight = 1.0 - exp(-1.0 / window);
-            let number = self.size as f64 * (2.0 - weight) / weight;
-            *average > 1.0 + SURPRISE * (2.0 / number).sqrt()
-        })
-    }
-}
-
-/// What a receiver of satellite navigation has said of its own motion, in inertial axes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Heard {
-    /// Time (s), position (m) and velocity (m/s) of the last fix, if there was one.
-    last: Option<(f64, Vector3<f64>, Vector3<f64>)>,
-    /// By how much its positions have moved beyond its velocities of late, m.
-    departure: Vector3<f64>,
-}
-
-impl Heard {
-    /// Takes a fix with this noise (m), and returns whether it agrees with those before.
-    fn agrees(&mut self, fix: (f64, Vector3<f64>, Vector3<f64>), noise: f64) -> bool {
-        let (time, position, velocity) = fix;
-        let Some((before, from, slower)) = self.last.replace(fix) else { return true };
-        let elapsed = time - before;
-        if elapsed > FORGOTTEN {
-            self.departure = Vector3::zeros();
-            return true;
-        }
-        let way = (velocity + slower) * (elapsed / 2.0);
-        self.departure = self.departure * exp(-elapsed / FORGOTTEN) + position - from - way;
-        let agrees = elapsed > 0.0
-            && self.departure.norm() <= DEPARTURE[0] * noise + DEPARTURE[1] * way.norm();
-        if !agrees {
-            self.departure = Vector3::zeros();
-        }
-        agrees
-    }
-}
 
 impl Navigation {
     /// Returns the state at a time (s) that need not be that of the last sample.

@@ -15,6 +15,7 @@ mod running;
 mod settings;
 mod shown;
 mod strapdown;
+mod watch;
 
 pub use device::Navigation;
 pub use filter::{Covariance, Error, STATES};

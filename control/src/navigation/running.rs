@@ -7,10 +7,10 @@ use super::filter::{
     Measured, POSITION, SIDE, UNSEEN, VELOCITY, WIND, Way, gravity_gradient, kept, propagated,
 };
 use super::history::History;
-use super::judge::{Heard, Watch};
 use super::line::Line;
 use super::settings::{Alignment, Settings};
 use super::strapdown::{Felt, State};
+use super::watch::{Heard, Watch};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use vehicle::atmosphere::air_anywhere;
