@@ -13,7 +13,7 @@ use super::filter::{
 use super::line::Contradiction;
 use super::running::{Running, Source};
 use super::strapdown::{State, rotation};
-use super::watch::{DEPARTURE, FORGOTTEN, RUN};
+use super::watch::{DEPARTURE, FORGOTTEN, Heard, RUN};
 use nalgebra::Vector3;
 use std::ops::Range;
 use vehicle::fixes::{GnssFix, StarFix};

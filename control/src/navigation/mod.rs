@@ -24,14 +24,12 @@ pub use settings::{Alignment, Drag, Errors, Fix, Initial, Settings, Trust, Wind}
 pub use shown::{Deviations, Shown};
 pub use strapdown::State;
 
-use running::Running;
+use running::{Running, UNSEEN_AFTER};
 use serde::{Deserialize, Serialize};
 use strapdown::Felt;
 use vehicle::frames::Place;
 use vehicle::math::exp;
 
-/// Time without a sample from which the navigation is lost, and a clock that lags is not believed, s.
-const LOST_AFTER: f64 = 0.5;
 /// Longest time over which the motion is shown without a sample, s.
 const LONGEST: f64 = 60.0;
 
@@ -105,7 +103,7 @@ impl Navigation {
     ) -> (Health, Contradiction) {
         let Trust { deviation, after } = self.settings.health;
         let (contradiction, of_filter) = self.contradiction(running, time);
-        let health = if time - running.last.time > LOST_AFTER {
+        let health = if time - running.last.time > UNSEEN_AFTER {
             Health::Lost
         } else if contradiction != Contradiction::None {
             if of_filter { Health::Inconsistent } else { Health::Suspect }

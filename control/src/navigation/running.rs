@@ -28,8 +28,9 @@ const SMALL_TILT: f64 = 2e-4;
 const SMALL_WIND: f64 = 0.5;
 /// Equal samples in a row, with noise on them, that only a frozen sensor gives.
 const STILL: u32 = 5;
-/// Time from which the motion since the last sample counts as unseen, s.
-const UNSEEN_AFTER: f64 = super::LOST_AFTER;
+/// Time since the last sample from which the motion counts as unseen and the navigation as lost,
+/// and a clock that lags is not believed, s.
+pub(super) const UNSEEN_AFTER: f64 = 0.5;
 
 /// State once a sample has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -22,7 +22,7 @@ pub(super) const FORGOTTEN: f64 = 30.0;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Watch {
     /// Time of the last one, s.
-    at: f64,
+    pub(super) at: f64,
     /// Number in a row that contradicted the filter, and that agreed among themselves.
     pub(super) refused: u32,
     pub(super) agreed: u32,
