@@ -54,7 +54,7 @@ impl Navigation {
         let circular = (planet.gravitation / planet.radius).sqrt();
         let is_plausible = radius > 0.9 && radius < 2.0 && speed < 2.0 * circular;
         let Some(then) = self.state_at(running, time).filter(|_| is_plausible) else {
-            return self.refuse(running, Source::Gnss);
+            return Self::refuse(running, Source::Gnss);
         };
         let felt = running.felt(&running.last);
         let over_ground = then.over_ground(planet);
@@ -78,7 +78,7 @@ impl Navigation {
     pub(super) fn take_star(&self, running: &mut Running, fix: &StarFix) {
         let then = self.state_at(running, fix.time);
         let (Some(then), Some(seen)) = (then, fix.rotation()) else {
-            return self.refuse(running, Source::Star);
+            return Self::refuse(running, Source::Star);
         };
         let error = (seen.inverse() * then.attitude.inverse()).scaled_axis();
         let noise = self.settings.fix.attitude;
@@ -95,7 +95,7 @@ impl Navigation {
     }
 
     /// Refuses a measurement of a device that contradicts itself.
-    fn refuse(&self, running: &mut Running, source: Source) {
+    fn refuse(running: &mut Running, source: Source) {
         running.rejected += 1;
         let watch = &mut running.watches[source as usize];
         (watch.agreed, watch.refused, watch.jumped) = (0, 0, true);
@@ -115,7 +115,7 @@ impl Navigation {
         let watch = &mut running.watches[source as usize];
         watch.note(running.last.time, squares, size);
         if !agrees {
-            return self.refuse(running, source);
+            return Self::refuse(running, source);
         }
         watch.agreed = (watch.agreed + 1).min(RUN);
         if watch.agreed < RUN {
@@ -126,7 +126,7 @@ impl Navigation {
         let gate = (self.settings.fix.gate + 3.0 * (size - 1) as f64) / size as f64;
         if squares <= gate {
             (watch.refused, watch.jumped) = (0, false);
-            self.apply(running, &error, covariance, source);
+            Self::apply(running, &error, &covariance, source);
             return;
         }
         watch.refused += 1;
@@ -137,32 +137,32 @@ impl Navigation {
         watch.refused = 0;
         let has_jumped = watch.jumped;
         match source {
-            Source::Gnss if self.explain_by_clock(running, measured, gate) => {}
-            Source::Gnss => self.restart(running, measured, POSITION, source),
+            Source::Gnss if Self::explain_by_clock(running, measured, gate) => {}
+            Source::Gnss => Self::restart(running, measured, POSITION, source),
             // The gyroscope does not jump: a star tracker that does is wrong, and not the filter.
             Source::Star if has_jumped => {}
-            Source::Star => self.restart(running, measured, ATTITUDE, source),
+            Source::Star => Self::restart(running, measured, ATTITUDE, source),
             Source::Side => widen(&mut running.covariance, WIND..DRAG),
             Source::Drag => widen(&mut running.covariance, DRAG..CLOCK),
         }
     }
 
     /// Corrects the filter by an offset of the receiver's clock, if that explains a fix.
-    fn explain_by_clock(&self, running: &mut Running, measured: &[Measured], gate: f64) -> bool {
+    fn explain_by_clock(running: &mut Running, measured: &[Measured], gate: f64) -> bool {
         let mut open = running.covariance;
         open[(CLOCK, CLOCK)] = CLOCK_RANGE * CLOCK_RANGE;
         let (error, covariance, squares) = updated(&open, measured);
         let explains = squares <= gate && (running.clock + error[CLOCK]).abs() <= CLOCK_RANGE;
         if explains {
             running.heard = Heard::default();
-            self.apply(running, &error, covariance, Source::Gnss);
+            Self::apply(running, &error, &covariance, Source::Gnss);
         }
         explains
     }
 
     /// Begins anew with the states from `from` on that are measured. The others keep their values,
     /// and after a second contradiction within a minute their deviations grow.
-    fn restart(&self, running: &mut Running, measured: &[Measured], from: usize, source: Source) {
+    fn restart(running: &mut Running, measured: &[Measured], from: usize, source: Source) {
         let mut error = Error::zeros();
         let mut covariance = running.covariance;
         // The velocities, on which the positions depend, come last.
@@ -182,7 +182,7 @@ impl Navigation {
         let doubt = &mut running.doubts[usize::from(from == ATTITUDE)];
         *doubt = doubt.max(error.fixed_rows::<3>(from).norm());
         running.restarted = now;
-        self.apply(running, &error, covariance, source);
+        Self::apply(running, &error, &covariance, source);
     }
 
     /// Returns what contradicts what at `time` (s), and whether it is the filter that the fixes

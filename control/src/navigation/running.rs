@@ -231,8 +231,8 @@ impl Navigation {
         let elapsed = line.time - running.last.time;
         running.history.keep(running.last.time, &running.state);
         let equal = [line.rate == running.last.rate, line.force == running.last.force];
-        for i in 0..2 {
-            let is_still = equal[i] && self.errors[i].noise > 0.0;
+        for (i, is_equal) in equal.into_iter().enumerate() {
+            let is_still = is_equal && self.errors[i].noise > 0.0;
             running.still[i] = if is_still { running.still[i].saturating_add(1) } else { 0 };
             if running.is_blind()[i] || elapsed > UNSEEN_AFTER {
                 running.blind[i] += elapsed;
@@ -323,17 +323,16 @@ impl Navigation {
 
     /// Corrects the filter by an error of its state. The shown state stays where it is.
     pub(super) fn apply(
-        &self,
         running: &mut Running,
         error: &Error,
-        covariance: Covariance,
+        covariance: &Covariance,
         source: Source,
     ) {
         let now = running.last.time;
         if matches!(source, Source::Gnss | Source::Star) {
             running.fixed = now;
         }
-        running.covariance = covariance;
+        running.covariance = *covariance;
         running.state.correct(error, 0.0);
         running.history.correct(error, now);
         let part = |from: usize| Vector3::from(error.fixed_rows::<3>(from));
