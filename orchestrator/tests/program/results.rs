@@ -205,7 +205,7 @@ margins = {{ rate = "{prefix}.rateMargin", moment = "{prefix}.momentMargin" }}
     let (line, metrics) = guarantee("2");
     assert_eq!(
         line,
-        "  guarantee         in force at 66.7 % of the ticks, lost at t = 2 s (exceeded)"
+        "  guarantee         in force at 66.66 % of the ticks, lost at t = 2 s (exceeded)"
     );
     assert_eq!(
         (&metrics["guarantee_share"], &metrics["guarantee_lost_at"]),
