@@ -2,12 +2,19 @@
 exist."""
 
 import re
+import sys
 import xml.etree.ElementTree as ET
+import zipfile
 
 import pytest
 
 import named
-from conftest import ROOT
+from conftest import ROOT, TARGET
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 
 def tables(page: str) -> list[tuple[list[str], list[list[str]]]]:
@@ -50,8 +57,15 @@ def test_every_erratum_has_a_test_that_exists(cells):
 
 @pytest.fixture(scope="module")
 def variables() -> set[str]:
-    """Returns the names of the variables of all FMUs."""
+    """The names of the variables of all FMUs, of what a file sets of them, and of what a file of a vehicle has."""
     found: set[str] = set()
+    for archive in (TARGET / "fmu").glob("*.fmu"):
+        page = zipfile.ZipFile(archive).read("documentation/index.html").decode()
+        found.update(re.findall(r"<code>([^<]+)</code>", page))
+    for text in (ROOT / "vehicle" / "data").glob("*.toml"):
+        for section, values in tomllib.loads(text.read_text("utf-8")).items():
+            found.add(f"[{section}]")
+            found.update(f"{section}.{key}" for key in (values if isinstance(values, dict) else []))
     for path in ROOT.glob("fmu-*/generated/*.xml"):
         found.update(variable.get("name") for variable in ET.parse(path).iter("ScalarVariable"))
     return found

@@ -240,10 +240,10 @@ def test_bad_arguments_are_refused(arguments, message):
 
 def test_a_run_that_ends_early_gives_what_it_has():
     with pytest.raises(OrchestratorError, match="attitude lost") as caught:
-        experiment("lqr", set={"plant.initial.beta": "85 deg"})
+        experiment("lqr", set={"plant.actuation.delay": 0.8})
     assert caught.value.exit_code == 3
     run = caught.value.run
-    assert run is not None and run.metrics["lost_at"] == 0.0 and len(run.table) == 1
+    assert run is not None and 1.0 < run.metrics["lost_at"] == run.table["time"].iloc[-1] < 50.0
 
 
 def test_warnings_of_the_orchestrator_are_warnings():
@@ -275,7 +275,7 @@ def test_the_command_runs_an_experiment_from_any_folder(tmp_path):
 def test_the_command_lists_what_the_package_has(tmp_path):
     done = orchestrator(tmp_path, "list")
     assert done.returncode == 0, done.stderr
-    for line in ("experiments (38)", "studies (8)", "FMUs (13)"):
+    for line in ("experiments (39)", "studies (8)", "FMUs (13)"):
         assert line in done.stdout
     assert "FAULT" not in done.stdout
 

@@ -88,7 +88,10 @@ def test_an_entry_is_the_same_at_every_longitude_and_over_the_date_line(tmp_path
             assert value[1:] == ["deg"], value
             return f"{(float(value[0]) + degrees + 180.0) % 360.0 - 180.0} deg"
 
-        return {"plant.initial.longitude": east("plant", "initial.longitude", 0.0),
+        start = east("plant", "initial.longitude", 0.0)
+        # A navigation is told where it begins.
+        told = {f"{part}.initial.longitude": start for part in ("plant", "navigation") if part in parts}
+        return {**told,
                 "guidance.target.longitude": east("guidance", "target.longitude", float(TARGET.split()[0]))}
 
     flights = [fly(path, tmp_path / f"east{k}", "--stop", "60", record=record, parameters=moved(degrees))

@@ -64,17 +64,29 @@ impl Navigation {
     pub fn update(&self, memory: &mut Memory, time: f64, line: &Line) {
         let mut line = *line;
         line.time = if line.sample > 0 { line.time.min(time) } else { time };
-        let running = match &mut memory.running {
+        match &mut memory.running {
             Some(running) => {
                 if let Some(missed) = running.succeeds(&mut line, time) {
                     memory.missed = memory.missed.saturating_add(missed);
                     self.take(running, &line);
                 }
-                running
             }
-            None if line.is_plausible() => memory.running.insert(self.begin(&line)),
-            None => return,
-        };
+            begun if line.is_plausible() => self.begin_in(begun, &line),
+            _ => return,
+        }
+        self.present(memory, time);
+    }
+
+    /// Begins with a line. A frame of its own keeps the stack of an update small.
+    #[inline(never)]
+    fn begin_in(&self, running: &mut Option<Running>, line: &Line) {
+        *running = Some(self.begin(line));
+    }
+
+    /// Shows the state at `time` (s), in a frame of its own as well.
+    #[inline(never)]
+    fn present(&self, memory: &mut Memory, time: f64) {
+        let Some(running) = &memory.running else { return };
         let felt = running.felt(&running.last);
         let (state, wind, unbiased) = running.blended();
         let age = (time - running.last.time).clamp(0.0, LONGEST);

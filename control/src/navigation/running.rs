@@ -227,6 +227,7 @@ impl Navigation {
     }
 
     /// Takes the next sample, with the fixes that came with it.
+    #[inline(never)]
     pub(super) fn take(&self, running: &mut Running, line: &Line) {
         let elapsed = line.time - running.last.time;
         running.history.keep(running.last.time, &running.state);
