@@ -6,8 +6,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Number of past states, and the least time between two of them, s: together 1.28 s.
-const KEPT: usize = 32;
-const SPACING: f64 = 0.04;
+const KEPT: usize = 16;
+const SPACING: f64 = 0.08;
 
 /// Past states, of which the newest one replaces the oldest one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
