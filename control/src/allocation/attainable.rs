@@ -24,11 +24,13 @@ pub struct Ball {
 /// Returns the largest ball about zero within the moments of some effectors, which add to a moment
 /// that is there without commands (N m).
 ///
-/// The moments form a zonotope. The distance of its boundary from zero is the least value of its
-/// support function h(n) = n·m₀ + Σ max(l nᵀc, u nᵀc) over the unit normals n of its faces, which
-/// are those of pairs of columns c. Any other direction has a larger value, so that columns which
-/// are nearly parallel do no harm.
+/// The moments form a zonotope about the moment at the middle of all ranges. The distance of its
+/// boundary from zero is the least value of its support function h(n) = n·centre + Σ |nᵀc| (u − l)/2
+/// over the unit normals n of its faces, which are those of pairs of columns c. Any other direction
+/// has a larger value, so that columns which are nearly parallel do no harm.
 pub fn largest_ball(effectors: &[Reach], offset: &Vector3<f64>) -> Ball {
+    let middle = |(column, low, high): &Reach| column * f64::midpoint(*low, *high);
+    let centre = effectors.iter().map(middle).fold(*offset, |sum, moment| sum + moment);
     let mut least = Ball { radius: f64::INFINITY, axis: Vector3::zeros() };
     for (i, (first, ..)) in effectors.iter().enumerate() {
         for (second, ..) in &effectors[i + 1..] {
@@ -37,19 +39,14 @@ pub fn largest_ball(effectors: &[Reach], offset: &Vector3<f64>) -> Ball {
             if length <= 0.0 {
                 continue;
             }
-            let at_offset = normal.dot(offset);
-            // Both sides of the face at once.
-            let (mut ahead, mut behind) = (at_offset, -at_offset);
-            for (column, low, high) in effectors {
-                let moment = normal.dot(column);
-                let (low, high) = (low * moment, high * moment);
-                ahead += low.max(high);
-                behind += (-low).max(-high);
-            }
-            for (support, sign) in [(ahead, 1.0), (behind, -1.0)] {
-                if support / length < least.radius {
-                    least = Ball { radius: support / length, axis: normal * (sign / length) };
-                }
+            let half =
+                |(column, low, high): &Reach| (normal.dot(column) * (high - low)).abs() / 2.0;
+            let across: f64 = effectors.iter().map(half).sum();
+            // Of both sides of the zonotope, zero is nearer to the one away from the centre.
+            let to_centre = normal.dot(&centre);
+            let radius = (across - to_centre.abs()) / length;
+            if radius < least.radius {
+                least = Ball { radius, axis: normal * (-to_centre.signum() / length) };
             }
         }
     }
