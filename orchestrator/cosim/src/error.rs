@@ -120,9 +120,9 @@ impl Error {
         move |source| Self::File { path, source }
     }
 
-    /// Returns the exit code of a process that ends with this error: 0 if there is none,
-    /// 1 for a run that failed or that an instance ended without results, 2 for bad usage or a bad experiment, 3 for a run
-    /// that was lost, and 130 or 143 for a run that a signal ended.
+    /// Returns the exit code of a process that ends with this error: 1 for a run that failed or that
+    /// an instance ended without results, 2 for bad usage or a bad experiment, 3 for a run that was
+    /// lost, and 130 or 143 for a run that a signal ended.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Experiment { .. } | Self::Import(Import::Fmu { .. }) => 2,
