@@ -47,6 +47,13 @@ def test_different_vehicles_in_one_loop_are_warned_of(orchestrate):
     assert "vehicle.file differs from component to component" in said and '"guidance" reads none' in said, said
 
 
+def test_settings_of_one_component_are_no_other_vehicle(orchestrate, tmp_path):
+    file = tmp_path / "gyroscope.toml"
+    file.write_text('sensor.gyroscope.bias.x = "0.2 deg/s"\n')
+    finished, _ = orchestrate(ENTRY / "navigated.toml", "--stop", "1", "--set", f"plant.settings.file={file}")
+    assert finished.returncode == 0 and "component to component" not in finished.stderr, finished.stderr
+
+
 def test_the_papers_vehicle_from_a_file_flies_with_the_same_bits(orchestrate, tmp_path):
     (tmp_path / "papers.toml").write_text(PAPERS, encoding="utf-8")
     parts = [f'[components.{name}.parameters]\n"vehicle.file" = "papers.toml"\n' for name in ("plant", "guidance", "allocator")]

@@ -17,7 +17,6 @@ use fmu_import::faults;
 use fmu_import::fmu::Fmu;
 use fmu_import::isolation;
 use fmu_import::lookup_table::is_lookup_table;
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -99,35 +98,31 @@ pub fn check(
     for (component, settings) in components.iter_mut().zip(settings) {
         component.settings = settings;
     }
-    warn_of_different_files(&components);
+    warn_of_different_vehicles(&components);
     Ok(System { experiment, clock, components, is_closed, loops, wires, columns, probes })
 }
 
-/// Warns if components read different files by a parameter of the same name, such as
-/// `vehicle.file`.
-fn warn_of_different_files(components: &[CheckedComponent]) {
-    let mut files: BTreeMap<&str, Vec<(&str, &str)>> = BTreeMap::new();
+/// Warns if components read different vehicles.
+fn warn_of_different_vehicles(components: &[CheckedComponent]) {
+    let mut read: Vec<(&str, &str)> = Vec::new();
     for CheckedComponent { name, fmu, settings, .. } in components {
-        let is_file =
-            |it: &&Variable| it.kind == VariableKind::String && settings::is_file(&it.name);
-        for variable in fmu.description.variables.iter().filter(is_file) {
-            let given = settings.iter().find(|setting| setting.name == variable.name);
-            let file = match given.map(|setting| &setting.value) {
-                Some(SettingValue::Text(file)) => file,
-                _ => variable.start.as_deref().unwrap_or_default(),
-            };
-            files.entry(&variable.name).or_default().push((name, file));
-        }
+        let is_vehicle =
+            |it: &&Variable| it.kind == VariableKind::String && it.name == settings::VEHICLE;
+        let Some(variable) = fmu.description.variables.iter().find(is_vehicle) else { continue };
+        let given = settings.iter().find(|setting| setting.name == variable.name);
+        let file = match given.map(|setting| &setting.value) {
+            Some(SettingValue::Text(file)) => file,
+            _ => variable.start.as_deref().unwrap_or_default(),
+        };
+        read.push((name, file));
     }
-    for (parameter, read) in files {
-        if read.iter().any(|(_, file)| *file != read[0].1) {
-            let read = read.iter().map(|(component, file)| match *file {
-                "" => format!("\"{component}\" reads none"),
-                file => format!("\"{component}\" reads {file}"),
-            });
-            let read = read.collect::<Vec<_>>().join(", ");
-            tracing::warn!("{parameter} differs from component to component: {read}");
-        }
+    if read.iter().any(|(_, file)| *file != read[0].1) {
+        let read = read.iter().map(|(component, file)| match *file {
+            "" => format!("\"{component}\" reads none"),
+            file => format!("\"{component}\" reads {file}"),
+        });
+        let read = read.collect::<Vec<_>>().join(", ");
+        tracing::warn!("{} differs from component to component: {read}", settings::VEHICLE);
     }
 }
 

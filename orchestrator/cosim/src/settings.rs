@@ -64,7 +64,7 @@ pub(crate) fn resolve(
 }
 
 /// Parameter of every component that knows a vehicle.
-const VEHICLE: &str = "vehicle.file";
+pub(crate) const VEHICLE: &str = "vehicle.file";
 
 /// Returns whether a parameter, such as `vehicle.file`, names a file.
 pub(crate) fn is_file(name: &str) -> bool {
