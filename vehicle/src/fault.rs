@@ -83,7 +83,8 @@ impl Fault {
         self.is(FaultKind::Restart, now) && !self.window.holds(before)
     }
 
-    /// Refuses sizes that are not finite or too large, and what the device does not measure.
+    /// Refuses sizes that are not finite or too large, an end before the start, and what the device
+    /// does not measure.
     pub(crate) fn check(
         &self,
         name: &str,
@@ -96,6 +97,10 @@ impl Fault {
         let quantities = FaultKind::Position as u8..=FaultKind::Accelerometer as u8;
         if quantities.contains(&(self.kind as u8)) && !measures.contains(&self.kind) {
             return refuse("kind", "is an error of what this sensor does not measure".into());
+        }
+        let Window { start, end } = self.window;
+        if self.kind != FaultKind::None && end < start {
+            return refuse("end", format!("= {end} s is before the start, {start} s"));
         }
         let late = self.of(FaultKind::Late, self.window.start);
         if !(self.size.is_finite() && late >= 0.0 && (late <= latest || latest == 0.0)) {

@@ -59,7 +59,10 @@ pub fn rank_correlation(x: &[f64], y: &[f64]) -> Option<(Estimate, f64)> {
     // Three pairs are too few.
     let end = |sign: f64| if n > 3.0 { (centre + sign * width).tanh() } else { sign };
     let (low, high) = (end(-1.0).min(value), end(1.0).max(value));
-    Some((Estimate { value, low, high }, 2.0 * (1.0 - t_distribution.cdf(t.abs()))))
+    // No order of ranks is rarer than one of n!, and its reverse.
+    let rarest = 2.0 / (2..=x.len()).map(|k| k as f64).product::<f64>();
+    let p_value = (2.0 * (1.0 - t_distribution.cdf(t.abs()))).max(rarest);
+    Some((Estimate { value, low, high }, p_value))
 }
 
 /// Returns the rank of each value; equal values share the mean of their ranks.
@@ -119,7 +122,8 @@ mod tests {
         assert!((p - 0.088_587_005_313_543_83).abs() < 1e-9, "{p}");
         // tanh(atanh(r) -+ 1.959964 sqrt((1 + r^2 / 2) / 2))
         assert!((r.low + 0.416_291).abs() < 1e-5 && (r.high - 0.992_046).abs() < 1e-5, "{r:?}");
-        let (r, _) = rank_correlation(&x, &[1.0, 8.0, 27.0, f64::NAN, 125.0]).unwrap();
+        let (r, p) = rank_correlation(&x, &[1.0, 8.0, 27.0, f64::NAN, 125.0]).unwrap();
+        assert!((p - 2.0 / 24.0).abs() < 1e-15, "{p}");
         // Four pairs in order are weak evidence.
         assert!(r.value == 1.0 && r.low < 0.0 && r.high == 1.0, "{r:?}");
         assert_eq!(rank_correlation(&x, &[2.0; 5]), None);
