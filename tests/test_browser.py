@@ -154,7 +154,7 @@ def assert_same_figures(page: Page, metrics: dict) -> None:
     assert rate == pytest.approx(metrics["max_rate_deg_s"], rel=1e-12)
 
 
-@pytest.mark.parametrize("address", ["controller=two-loop&plant.actuation.delay=0.2", "controller=btvsmc&plant.initial.beta=89+deg"])
+@pytest.mark.parametrize("address", ["controller=two-loop&plant.actuation.delay=0.2", "controller=lqr&plant.actuation.delay=1.0"])
 def test_a_lost_attitude_ends_the_flight_as_in_the_orchestrator(chromium, tmp_path, address):
     page = opened(chromium, address, accept_downloads=True)
     shown, end = signals(page), page.evaluate("flight.summary.end")

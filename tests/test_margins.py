@@ -218,7 +218,7 @@ def test_oracle_surfaces_give_small_motions_the_margins_of_the_loop_without_them
     # The gain of TwoLoopSMC depends on the amplitude. Smaller motions drown in what the allocator's iterations leave.
     if (start := {"FBL": 3e-5, "CRMPC": 1e-4}.get(law)) is None:
         return
-    # Beyond the margin a small motion grows until the surfaces are too slow for it.
+    # Beyond the margin a small motion grows until the surfaces are too slow for it, and stays.
     for share, is_stable in ((0.98, True), (1.02, False)):
         rates = [f"plant.initial.{name}={rate * start} deg/s" for name, rate in zip("pqr", (1.3, 1.0, 0.7))]
         more = [f"plant.inertia.scale={1.0 / (share * gain)}", *rates]
@@ -226,7 +226,7 @@ def test_oracle_surfaces_give_small_motions_the_margins_of_the_loop_without_them
         call(*command, "--quiet", "--force", "--no-plot", "--stop", "80", "--out", tmp_path / "run")
         table = pd.read_csv(tmp_path / "run" / "results.csv", index_col="time")
         rates = table[[f"plant.rate.{name}" for name in "pqr"]].abs().max(axis=1)
-        growth = rates[rates.index > 64.0].max() / np.radians(start)
+        growth = rates[rates.index > 32.0].max() / np.radians(start)
         assert (growth < 0.5) if is_stable else (growth > 1.0), f"{share}: {growth}"
 
 

@@ -32,7 +32,7 @@ def listed() -> list[dict]:
 
 # Experiments whose description announces the warning.
 MEANT_TO_WARN = {
-    "entry/known-moments": ["less than a tenth of limit.moment"],
+    "known-moments": ["less than a tenth of limit.moment"],
     "attainable": ["the guarantee is not in force"],
 }
 

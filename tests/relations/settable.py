@@ -114,7 +114,8 @@ def flown(experiment: Path, folder: Path, to_the_end: bool) -> list[tuple[str, P
         if component["fmu"].endswith(".fmu"):
             own = {column.removeprefix(f"{part}."): values for column, values in columns.items() if column.startswith(f"{part}.")}
             observed = frozenset(one.removeprefix(f"{part}.") for one in shown if one.startswith(f"{part}."))
-            settings = {key: number(value) for key, value in component.get("parameters", {}).items()}
+            vehicle = {"vehicle.file": merged["vehicle"]["file"]} if "vehicle" in merged else {}
+            settings = vehicle | {key: number(value) for key, value in component.get("parameters", {}).items()}
             places.append((component["fmu"].removesuffix(".fmu"), Place(name, settings, columns["time"], own, observed)))
     return places
 

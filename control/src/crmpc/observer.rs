@@ -26,23 +26,28 @@ pub struct Observed {
     /// Angles and rates x_ω at the last tick and the acceleration commanded there; `None` before
     /// the first tick.
     last: Option<[Vector3<f64>; 3]>,
+    /// Whether the measurement of the last tick was older than that.
+    was_stale: bool,
 }
 
 impl Observed {
     /// Updates the estimate with the rates x_ω at a tick. Their change beyond the commanded
     /// acceleration is the mean of Δ over the period. It is filtered by a first-order lag and
     /// limited to twice the bound of Δ. `by_known` returns the acceleration by the known moment,
-    /// which acts alone before the first command does.
+    /// which acts alone before the first command does. A measurement that is stale has its share in
+    /// the mean, but is judged by no assumption.
     pub(super) fn observe(
         &mut self,
         s: &Settings,
         observable: &Observable,
         rates: &Vector3<f64>,
+        is_stale: bool,
         by_known: impl FnOnce() -> Vector3<f64>,
     ) {
         self.is_contradicted = false;
+        let was_stale = std::mem::replace(&mut self.was_stale, is_stale);
         let Some([angles, before, commanded]) = self.last else {
-            self.by_moment = self.by_moment.sup(&by_known().abs());
+            self.by_moment = by_known().abs();
             return;
         };
         let residual = (rates - before) / s.period_feedback - commanded;
@@ -52,6 +57,10 @@ impl Observed {
         self.disturbance.apply(|value| *value = value.clamp(-bound, bound));
         let by_moment = (commanded - s.body.drift(&angles, &before)).abs();
         self.by_moment = by_moment.sup(&(self.by_moment * observable.retained));
+        if is_stale || was_stale {
+            self.excess = Excess::default();
+            return;
+        }
         let allowed = observable.largest(&self.by_moment) * s.period_feedback;
         self.is_contradicted =
             !self.excess.add(&(residual * s.period_feedback), &allowed, observable.once);
@@ -63,13 +72,9 @@ impl Observed {
         observable.is_finite() && !self.is_contradicted
     }
 
-    /// Stores angles, rates and commanded acceleration for the next tick; `None` if they are not
-    /// those of the tick, so that nothing can be observed from there on.
-    pub(super) fn remember(&mut self, last: Option<[Vector3<f64>; 3]>) {
-        self.last = last;
-        if last.is_none() {
-            (self.excess, self.is_contradicted) = (Excess::default(), false);
-        }
+    /// Stores angles, rates and commanded acceleration for the next tick.
+    pub(super) fn remember(&mut self, last: [Vector3<f64>; 3]) {
+        self.last = Some(last);
     }
 
     /// Replaces the stored command by the acceleration that `applied` (N m) gives.

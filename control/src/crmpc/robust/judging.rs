@@ -72,8 +72,7 @@ impl Robust {
         if memory.guarantee == GuaranteeStatus::Pending && memory.pending == 0 {
             memory.guarantee = GuaranteeStatus::InForce;
         }
-        let last = [measured.angles, tick.angle_rates, *commanded];
-        memory.observed.remember((!measured.stale).then_some(last));
+        memory.observed.remember([measured.angles, tick.angle_rates, *commanded]);
         let period = self.settings.period_feedback;
         memory.supervision.judge(memory.guarantee, contradiction, period);
     }

@@ -65,12 +65,9 @@ impl Robust {
         memory.acting.ticks = memory.acting.ticks.saturating_sub(1);
         let Self { settings, design, .. } = self;
         let Measurement { angles, known_moment, stale, .. } = tick.measured;
-        if *stale {
-            return memory.observed.remember(None);
-        }
-        memory.observed.observe(settings, &design.tightening.observable, &tick.angle_rates, || {
-            kinematics::r(angles) * settings.body.inverse * known_moment
-        });
+        let by_known = || kinematics::r(angles) * settings.body.inverse * known_moment;
+        let observable = &design.tightening.observable;
+        memory.observed.observe(settings, observable, &tick.angle_rates, *stale, by_known);
     }
 
     /// Returns the moment for an acceleration, N m. It is exact in the middle of the period over

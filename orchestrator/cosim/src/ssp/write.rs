@@ -172,8 +172,14 @@ fn connector(variable: &Variable) -> Element {
 }
 
 /// Writes the values of a component. One that equals the start value is written as well, because
-/// setting it may have an effect of its own.
+/// setting it may have an effect of its own; but not an item of an enumeration, as importers such as
+/// libcosim read none.
 fn bindings(component: &CheckedComponent) -> Option<Element> {
+    let is_written = |setting: &&Setting| {
+        let start = component.fmu.description.find(&setting.name);
+        let start = start.and_then(|(_, variable)| variable.start.as_deref()?.parse().ok());
+        !matches!(setting.value, SettingValue::Item(_, value) if start == Some(value))
+    };
     let parameter = |setting: &Setting| {
         let (kind, value) = match &setting.value {
             SettingValue::Real(value) => ("ssv:Real", real(*value)),
@@ -185,7 +191,7 @@ fn bindings(component: &CheckedComponent) -> Option<Element> {
         Element::new("ssv:Parameter", [("name", setting.name.clone())])
             .holding([Element::new(kind, [("value", value)])])
     };
-    let parameters = component.settings.iter().map(parameter);
+    let parameters = component.settings.iter().filter(is_written).map(parameter);
     let name = identifier(&format!("{}_values", component.name));
     let set = listed("ssv:Parameters", parameters).map(|parameters| {
         Element::new("ssv:ParameterSet", [("version", "1.0".into()), ("name", name)])

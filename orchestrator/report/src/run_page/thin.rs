@@ -5,7 +5,8 @@ use std::ops::Range;
 /// Number of pixel columns for which a curve keeps its smallest and its largest value.
 const COLUMNS: usize = 1000;
 /// Number of rows that are all shown, and of parts of a longer run of which some rows are.
-const FRAMES: usize = 700;
+const FRAMES: usize = 1500;
+const PARTS: usize = 375;
 
 /// Returns the rows of each pixel column; `None` if all rows can be kept.
 fn columns(rows: usize) -> Option<impl Iterator<Item = Range<usize>>> {
@@ -38,7 +39,7 @@ pub(crate) fn values(values: &[f64]) -> Vec<f64> {
 /// Returns the rows at which a vehicle is shown: of each even part of a run the first row and those
 /// at which one of these quantities is largest, and the last row of the run.
 pub(crate) fn frames(rows: usize, quantities: &[Vec<f64>]) -> Vec<usize> {
-    let stride = rows.div_ceil(FRAMES).max(1);
+    let stride = if rows <= FRAMES { 1 } else { rows.div_ceil(PARTS) };
     let mut frames = Vec::new();
     for first in (0..rows).step_by(stride) {
         let part = first..rows.min(first + stride);
@@ -92,7 +93,7 @@ mod tests {
         rate[..300].fill(f64::NAN);
         (rate[77_777], lost[77_778], lost[5]) = (9.0, 1.0, 1.0);
         let many = frames(100_001, &[rate, lost]);
-        assert!(many.len() <= FRAMES + 5 && many.is_sorted());
+        assert!(many.len() <= PARTS + 5 && many.is_sorted());
         assert!([0, 5, 77_777, 77_778, 100_000].iter().all(|row| many.contains(row)));
     }
 }
