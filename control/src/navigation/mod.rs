@@ -34,9 +34,10 @@ use vehicle::math::exp;
 const LONGEST: f64 = 60.0;
 
 /// State that is carried from tick to tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Memory {
-    running: Option<Running>,
+    /// State once a sample has arrived, apart from the rest because a caller's stack may be small.
+    running: Box<Option<Running>>,
     /// What is shown.
     pub shown: Shown,
     /// Health of the navigation.
@@ -45,6 +46,20 @@ pub struct Memory {
     pub contradiction: Contradiction,
     /// Number of samples that never arrived.
     pub missed: u32,
+}
+
+impl Clone for Memory {
+    fn clone(&self) -> Self {
+        Self { running: self.running.clone(), ..*self }
+    }
+
+    /// Copies a memory without allocation, as at every tick.
+    fn clone_from(&mut self, source: &Self) {
+        let Self { running, shown, health, contradiction, missed } = self;
+        running.clone_from(&source.running);
+        *shown = source.shown;
+        (*health, *contradiction, *missed) = (source.health, source.contradiction, source.missed);
+    }
 }
 
 impl Navigation {
@@ -64,7 +79,7 @@ impl Navigation {
     pub fn update(&self, memory: &mut Memory, time: f64, line: &Line) {
         let mut line = *line;
         line.time = if line.sample > 0 { line.time.min(time) } else { time };
-        match &mut memory.running {
+        match &mut *memory.running {
             Some(running) => {
                 if let Some(missed) = running.succeeds(&mut line, time) {
                     memory.missed = memory.missed.saturating_add(missed);
@@ -86,7 +101,7 @@ impl Navigation {
     /// Shows the state at `time` (s), in a frame of its own as well.
     #[inline(never)]
     fn present(&self, memory: &mut Memory, time: f64) {
-        let Some(running) = &memory.running else { return };
+        let Some(running) = &*memory.running else { return };
         let felt = running.felt(&running.last);
         let (state, wind, unbiased) = running.blended();
         let age = (time - running.last.time).clamp(0.0, LONGEST);
@@ -137,7 +152,7 @@ impl Navigation {
         truth: &Place,
         wind: [f64; 2],
     ) -> Option<(Error, Covariance)> {
-        let running = memory.running.as_ref()?;
+        let running = memory.running.as_ref().as_ref()?;
         Some((self.error_of(running, truth, wind), running.covariance))
     }
 }
