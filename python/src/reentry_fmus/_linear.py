@@ -144,16 +144,15 @@ def margins(
         fmu: FMUs that replace those of components.
         step: Length of the communication step, s.
         law: Law in Python that replaces the controller, as in `experiment`. Its memory is copied
-            with the state of the loop (`copy.deepcopy`; a function that encloses variables by
-            cloudpickle, if that is installed).
+            with the state of the loop, as by `linearise`.
 
     Returns:
         One row for each signal, with the loops of the others closed, and one for all together:
         factors of the gain, phase lag (deg) and delay (s) at which the loop becomes unstable, the
         radius of the disk margin with its frequency (rad/s), and the largest magnitude of the
         sensitivity. What has no limit is not a number. The table is empty if the loop is unstable,
-        with a warning; `attrs` has "stable", "spectral_radius", "period", "note", and "sides" with the answers for
-        increases and decreases where the loop has no derivative.
+        with a warning; `attrs` has "stable", "spectral_radius", "period", "note", and "sides" with
+        the answers for increases and decreases where the loop has no derivative.
 
     Raises:
         OrchestratorError: The experiment was refused, or its run failed.

@@ -1,5 +1,5 @@
 //! Bounds on the derivatives of the acceleration F and of the moment m by the product rule, with
-//! the bounds on the derivatives of W from [`super::geometry`] (docs/guarantee.md, steps 1 and 4).
+//! the bounds on the derivatives of W from [`super::geometry`] (docs/proof.md, steps 1 and 4).
 //!
 //! B is the symmetric bilinear form with B(ω, ω) = 2 ω × I ω, and ‖B(u, v)‖ ≤ (I_max − I_min) ‖u‖
 //! ‖v‖. With ω = W x its derivatives are
