@@ -47,6 +47,21 @@ def test_runs_repeat_bit_for_bit(experiment, orchestrate):
     assert (out / "results.csv").read_bytes() == (experiment("crmpc-robust") / "results.csv").read_bytes()
 
 
+def test_a_vector_is_set_as_a_whole(orchestrate):
+    short = [EXPERIMENTS / "lqr.toml", "--stop", "1"]
+    given = ["--set", "controller.weight.P=50", "--set", "controller.weight.P[2]=60", "--set", "controller.weight.Q=[1, 2, 3]"]
+    entries = [f"controller.weight.P[{k}]={60 if k == 2 else 50}" for k in range(1, 7)]
+    entries += [f"controller.weight.Q[{k}]={k}" for k in (1, 2, 3)]
+    whole, out = orchestrate(*short, *given)
+    single, other = orchestrate(*short, *(word for entry in entries for word in ("--set", entry)))
+    assert whole.returncode == single.returncode == 0, whole.stderr
+    assert (out / "results.csv").read_bytes() == (other / "results.csv").read_bytes()
+    parameters = json.loads((out / "results.json").read_text())["components"]["controller"]["parameters"]
+    assert [parameters[f"weight.P[{k}]"] for k in range(1, 7)] == [50, 60, 50, 50, 50, 50]
+    refused, _ = orchestrate(*short, "--set", "controller.weight.Q=[1, 2]")
+    assert refused.returncode == 2 and "has 2 values, but the entries are weight.Q[1], weight.Q[2], weight.Q[3]" in refused.stderr
+
+
 def test_a_lost_attitude_ends_the_run(orchestrate):
     finished, out = orchestrate(EXPERIMENTS / "lqr.toml", "--set", "plant.actuation.delay=0.8")
     assert finished.returncode == 3, finished.stderr

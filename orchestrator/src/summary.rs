@@ -179,10 +179,15 @@ fn guarantee(metrics: &Metrics) -> Option<SummaryLine> {
     } else {
         ""
     };
-    let is_within = broken.then_some(false);
+    let unfounded = number("unfounded_at").map_or(String::new(), |time| {
+        let what = metrics.text("guarantee_unfounded").unwrap_or_default();
+        let time = rounded(time);
+        format!("; while it was in force, an ASSUMPTION did not hold at t = {time} s: {what} > 1")
+    });
+    let is_within = (broken || !unfounded.is_empty()).then_some(false);
     Some(SummaryLine {
         heading: "guarantee".into(),
-        text: text + defect,
+        text: text + defect + &unfounded,
         is_within,
         ..SummaryLine::default()
     })
@@ -298,6 +303,13 @@ mod tests {
         assert_eq!(guarantee(&never).unwrap().text, "never in force (refused)");
         let without_margins = guarantee(&metrics(&[("share", number(1.0))])).unwrap();
         assert_eq!(without_margins.text, "in force throughout");
+        let unfounded = [("unfounded", text("a.b / a.c")), ("unfounded_at", number(12.5))];
+        let unfounded = guarantee(&metrics(&[&throughout[..], &unfounded].concat())).unwrap();
+        assert_eq!(
+            unfounded.text,
+            "in force throughout; while it was in force, an ASSUMPTION did not hold at t = 12.5 s: a.b / a.c > 1"
+        );
+        assert_eq!(unfounded.is_within, Some(false));
         // Only a defect is a verdict on the limits.
         assert_eq!(without_margins.is_within, None);
         assert_eq!(guarantee(&metrics(&broken)).unwrap().is_within, Some(false));

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::experiment::Experiment;
+use fmi_master::description::ModelDescription;
 use fmi_master::settings::Setting;
 use fmi_master::wiring::{Part, Wire};
 use std::path::Path;
@@ -32,14 +33,35 @@ pub(crate) fn resolve(
                 experiment.source.error(&span, format!("\"{path}\": {message}"))
             }
         };
-        if component.is_exchanged && !is_assigned && part.description.find(name).is_none() {
+        let entries = entries(name, part.description);
+        let is_there = part.description.find(name).is_some() || !entries.is_empty();
+        if component.is_exchanged && !is_assigned && !is_there {
             left_out.push(name.as_str());
             continue;
         }
         let beside = (!is_assigned).then(|| file_beside(experiment, name, written.get_ref()));
         let value = beside.flatten().unwrap_or_else(|| written.get_ref().clone());
-        let setting = Setting::new(name, &value, index, part, wires, is_assigned);
-        settings.push(setting.map_err(refuse)?);
+        for (place, entry) in entries.iter().enumerate() {
+            let value = match &value {
+                Value::Array(values) if values.len() == entries.len() => &values[place],
+                Value::Array(values) => {
+                    let (given, needed) = (values.len(), entries.join(", "));
+                    return Err(refuse(format!(
+                        "has {given} values, but the entries are {needed}"
+                    )));
+                }
+                one => one,
+            };
+            // What is said of an entry alone holds.
+            if !component.parameters.contains_key(*entry) {
+                let setting = Setting::new(entry, value, index, part, wires, is_assigned);
+                settings.push(setting.map_err(refuse)?);
+            }
+        }
+        if entries.is_empty() {
+            let setting = Setting::new(name, &value, index, part, wires, is_assigned);
+            settings.push(setting.map_err(refuse)?);
+        }
     }
     if let Some(flown) = &experiment.vehicle
         && part.description.find(VEHICLE).is_some()
@@ -61,6 +83,16 @@ pub(crate) fn resolve(
         );
     }
     Ok(settings)
+}
+
+/// Returns the names of the entries of a vector of parameters, such as `weight.P[1]` of `weight.P`;
+/// none if there is no such vector.
+fn entries<'a>(name: &str, description: &'a ModelDescription) -> Vec<&'a str> {
+    let is_entry = |other: &&str| {
+        other.strip_prefix(name).is_some_and(|rest| rest.starts_with('[') && rest.ends_with(']'))
+    };
+    let is_one = description.find(name).is_some();
+    description.names("parameter").filter(|other| !is_one && is_entry(other)).collect()
 }
 
 /// Parameter of every component that knows a vehicle.

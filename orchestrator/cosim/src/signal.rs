@@ -16,6 +16,9 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::iter;
 
+/// Tolerance with which limits count as met, because of rounding.
+const ROUNDING: f64 = 1e-9;
+
 /// A signal as an experiment or a study describes it.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema)]
 #[serde(try_from = "String", into = "String")]
@@ -229,18 +232,29 @@ impl Resolved {
 
     /// Computes the value of the signal in a sample, in the signal's unit.
     pub fn value(&self, values: &[f64]) -> f64 {
+        self.factor * self.undivided(values) / self.over.map_or(1.0, |over| values[over])
+    }
+
+    /// Returns whether the magnitude of the signal is more than 1, or not a number. Of a signal that
+    /// is divided, 0 is not more than 0.
+    pub fn is_beyond_one(&self, values: &[f64]) -> bool {
+        let most = self.over.map_or(1.0, |over| values[over]);
+        let size = (self.factor * self.undivided(values)).abs();
+        size > most * (1.0 + ROUNDING) || size.is_nan() || most.is_nan()
+    }
+
+    fn undivided(&self, values: &[f64]) -> f64 {
         let term = |term: &Term<usize>| match term.with {
             None => values[term.value],
             Some((relation, other)) => {
                 relation.combine(values[term.value], values[other], self.whole_turn)
             }
         };
-        let value = if self.norm {
+        if self.norm {
             self.terms.iter().map(|t| term(t).powi(2)).sum::<f64>().sqrt()
         } else {
             self.terms.iter().map(term).sum()
-        };
-        self.factor * value / self.over.map_or(1.0, |over| values[over])
+        }
     }
 }
 

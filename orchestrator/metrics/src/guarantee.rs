@@ -1,7 +1,6 @@
 //! A controller's guarantee that limits are kept: when it is in force, and whether the limits are
 //! kept then.
 
-use crate::measure::larger;
 use cosim::error::Error;
 use cosim::experiment::Guarantee;
 use cosim::run::{Observer, Sample};
@@ -22,6 +21,8 @@ pub struct GuaranteeSignals {
     /// Signals as multiples of their limits, which must not exceed 1 while the guarantee is in
     /// force.
     pub keeps: Vec<Resolved>,
+    /// Signals, with their texts, that the guarantee assumes not to exceed 1.
+    pub assumes: Vec<(String, Resolved)>,
 }
 
 /// The first tick at which the guarantee was no longer in force.
@@ -47,10 +48,10 @@ pub struct GuaranteeRecord {
     pub margins: Vec<Option<f64>>,
     /// Whether a limit was exceeded at a tick at which the guarantee was in force.
     pub broken: bool,
+    /// First time at which an assumption did not hold while the guarantee was in force (s), and the
+    /// index of its signal.
+    pub unfounded: Option<(f64, usize)>,
 }
-
-/// Tolerance with which limits count as met, because of rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// Returns the smaller value. Unlike `f64::min` it does not hide a value that is not a number.
 fn smaller(a: f64, b: f64) -> f64 {
@@ -81,12 +82,17 @@ impl GuaranteeSignals {
             }
         }
         let observe = system.experiment.observe.clone();
-        let keeps = guarantee.keeps.as_ref().map_or(Ok(&[][..]), |name| observe.list(name))?;
-        for signal in keeps {
-            if !system.lost_by_exchange(signal.paths()) {
-                signals.keeps.push(system.resolve(signal)?);
+        let mut of_list = |name: &Option<String>| {
+            let mut found = Vec::new();
+            for signal in name.as_ref().map_or(Ok(&[][..]), |name| observe.list(name))? {
+                if !system.lost_by_exchange(signal.paths()) {
+                    found.push((signal.clone().into(), system.resolve(signal)?));
+                }
             }
-        }
+            Ok::<_, String>(found)
+        };
+        signals.keeps = of_list(&guarantee.keeps)?.into_iter().map(|(_, signal)| signal).collect();
+        signals.assumes = of_list(&guarantee.assumes)?;
         Ok(Some(signals))
     }
 }
@@ -150,10 +156,12 @@ impl Observer for GuaranteeRecord {
             for (smallest, (_, place)) in self.margins.iter_mut().zip(&self.signals.margins) {
                 *smallest = smallest.iter().copied().chain([values[*place]]).reduce(smaller);
             }
-            // A value that is not a number is not within its limit.
-            let largest =
-                self.signals.keeps.iter().map(|signal| signal.value(values)).fold(0.0, larger);
-            self.broken |= largest.is_nan() || largest > 1.0 + ROUNDING;
+            self.broken |= self.signals.keeps.iter().any(|signal| signal.is_beyond_one(values));
+            let beyond = |(_, signal): &(String, Resolved)| signal.is_beyond_one(values);
+            if self.unfounded.is_none() {
+                let found = self.signals.assumes.iter().position(beyond);
+                self.unfounded = found.map(|index| (sample.time, index));
+            }
         } else if self.ticks_in_force > 0 && self.lost.is_none() {
             self.lost = Some(GuaranteeLoss { time: sample.time, status: self.status });
         }
@@ -174,6 +182,7 @@ mod tests {
             status: Some(Probed { place: 1, ..Probed::default() }),
             margins: vec![("rate".into(), 2), ("moment".into(), 3)],
             keeps: vec![keeps(4), keeps(5)],
+            assumes: Vec::new(),
         });
         for (tick, row) in rows.iter().enumerate() {
             let mut values = *row;
@@ -213,6 +222,28 @@ mod tests {
         assert!(record(&[[1.0, 1.0, 0.0, 0.0, 0.0, 10.01]]).broken);
         assert!(record(&[[1.0, 1.0, 0.0, 0.0, f64::NAN, 0.0]]).broken);
         assert!(!record(&[[0.0, 3.0, 0.0, 0.0, 0.2, 20.0]]).broken);
+    }
+
+    #[test]
+    fn an_error_beyond_the_declared_is_told_only_while_in_force() {
+        let error = Resolved { over: Some(2), ..Resolved::difference(1, 3) };
+        let unfounded = |rows: &[[f64; 4]]| {
+            let assumes =
+                vec![("other".into(), Resolved::variable(3)), ("error".into(), error.clone())];
+            let signals = GuaranteeSignals { assumes, ..GuaranteeSignals::default() };
+            let mut record = GuaranteeRecord::new(signals);
+            for (tick, values) in rows.iter().enumerate() {
+                let (tick, time) = (tick as u64, tick as f64);
+                record.observe(&Sample { tick, time, last: false, values }).unwrap();
+            }
+            record.unfounded
+        };
+        // In force, measured, declared, true: without an error none need be declared.
+        assert_eq!(unfounded(&[[1.0, 0.5, 0.0, 0.5], [1.0, 0.5, 0.1, 0.6]]), None);
+        assert_eq!(unfounded(&[[0.0, 0.5, 0.0, 0.6], [1.0, 0.5, 0.2, 0.6]]), None);
+        let broken = [[1.0, 0.5, 0.2, 0.6], [1.0, 0.5, 0.0, 0.6], [1.0, 0.5, 0.0, 9.0]];
+        assert_eq!(unfounded(&broken), Some((1.0, 1)));
+        assert_eq!(unfounded(&[[1.0, f64::NAN, 1.0, 0.0]]), Some((0.0, 1)));
     }
 
     #[test]

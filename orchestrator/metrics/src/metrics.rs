@@ -143,8 +143,9 @@ fn margin_names() -> impl Iterator<Item = String> {
 fn guarantee_names(guarantee: &Guarantee) -> Vec<String> {
     let margins = guarantee.margins.keys().map(|name| margin(name));
     let broken = guarantee.keeps.iter().map(|_| "broken".into());
-    let names =
-        ["share", "lost_at", "status"].map(String::from).into_iter().chain(margins).chain(broken);
+    let unfounded = guarantee.assumes.iter().flat_map(|_| ["unfounded", "unfounded_at"]);
+    let names = ["share", "lost_at", "status"].into_iter().chain(unfounded).map(String::from);
+    let names = names.chain(margins).chain(broken);
     names.map(|name| format!("guarantee_{name}")).collect()
 }
 
@@ -373,6 +374,10 @@ impl Meters {
                 }
                 if !record.signals.keeps.is_empty() {
                     set("broken", Some(Value::Flag(record.broken)));
+                }
+                if let Some((time, index)) = record.unfounded {
+                    set("unfounded", Some(Value::Text(record.signals.assumes[index].0.clone())));
+                    set("unfounded_at", Some(Value::Number(time)));
                 }
             }
         }

@@ -190,6 +190,9 @@ pub struct Guarantee {
     /// Name of a list of signals that must not exceed 1 while the guarantee is in force. If one
     /// does, the guarantee is broken.
     pub keeps: Option<String>,
+    /// Name of a list of signals, as errors over the largest that are declared, which the guarantee
+    /// assumes not to exceed 1.
+    pub assumes: Option<String>,
     /// Group of variables that show the plan that is followed, for the page of a run: `began`, and
     /// `time`, `rate`, `rateBound`, `moment` and `momentBound` with an index.
     pub plan: Option<String>,

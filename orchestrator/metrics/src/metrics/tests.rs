@@ -186,6 +186,7 @@ fn the_guarantee_is_among_the_metrics() {
         status: Some(status),
         margins: vec![("moment".into(), 3), ("rate".into(), 2)],
         keeps: vec![Resolved::variable(4)],
+        ..GuaranteeSignals::default()
     };
     let mut meters = meters();
     meters.guarantee = (Some(asked.clone()), None);
