@@ -44,12 +44,17 @@ pub struct Scheduled {
     /// present, if it is smaller than disturbance.bound.
     #[setting(unit = "rad/s2", min = 0.0, nominal = 0.03)]
     pub disturbance_bound: f64,
+    /// Bound on the error of each measured angle that holds at present, such as protection.attitude
+    /// of a navigation. While it is larger than estimation.angleError and estimation.slowAngleError
+    /// together, nothing is guaranteed.
+    #[setting(unit = "rad", min = 0.0, nominal = 0.01)]
+    pub angle_error: f64,
 }
 
 impl Default for Scheduled {
-    /// Returns limits that are larger than any of a vehicle.
+    /// Returns limits that are larger than any of a vehicle, and no error.
     fn default() -> Self {
-        Self { limit_moment: 1e9, disturbance_bound: 1e3 }
+        Self { limit_moment: 1e9, disturbance_bound: 1e3, angle_error: 0.0 }
     }
 }
 
@@ -72,6 +77,7 @@ impl Measurement {
         vectors.into_iter().chain(achieved_moment).flatten().all(|value| value.is_finite())
             && !scheduled.limit_moment.is_nan()
             && !scheduled.disturbance_bound.is_nan()
+            && !scheduled.angle_error.is_nan()
     }
 
     /// Returns the measurement with the rates relative to axes that turn with the trajectory, for a

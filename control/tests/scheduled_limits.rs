@@ -23,6 +23,7 @@ fn up_and_down(s: &Settings, time: f64) -> Scheduled {
     Scheduled {
         limit_moment: of_moment * s.limit_moment,
         disturbance_bound: of_disturbance * s.disturbance_bound,
+        ..Scheduled::default()
     }
 }
 

@@ -148,6 +148,9 @@ impl Law for CrmpcLaw {
                 Contradiction::Schedule => {
                     "the guarantee is no longer in force: scheduled.limitMoment has fallen, or scheduled.disturbanceBound risen, by more than the plan reserves"
                 }
+                Contradiction::Errors => {
+                    "the guarantee is no longer in force: scheduled.angleError is larger than estimation.angleError and estimation.slowAngleError together"
+                }
                 Contradiction::Turn => {
                     "the guarantee is no longer in force: the turn given by trajectory.* has changed by more than trajectory.turnChange while a plan was followed"
                 }

@@ -97,38 +97,39 @@ fn a_tick_evaluated_with_other_inputs_leaves_no_trace() {
     assert_eq!(once.output.moment, twice.output.moment);
 }
 
-fn assert_any_communication_steps_give_the_same_moments<L: Law>(delay: f64) {
-    let start =
-        || ready(|instance: &mut ControllerFmu<L>| instance.parameters.latency.action = delay);
-    let mut reference = start();
-    let expected: Vec<_> = (0..10_u32)
-        .map(|k| {
-            step(&mut reference, f64::from(k) * 0.2, f64::from(k + 1) * 0.2);
-            reference.output.moment
-        })
-        .collect();
-    for parts in [1, 3, 5, 10] {
-        let mut instance = start();
-        for (k, expected) in (0..10_u32).zip(&expected) {
+/// Asserts that the moments of every optimisation period are the same, in however many of these
+/// `parts` it is stepped.
+fn assert_any_communication_steps_give_the_same_moments<L: Law>(delay: f64, parts: &[u32]) {
+    let moments = |parts: u32| -> Vec<_> {
+        let mut instance =
+            ready(|instance: &mut ControllerFmu<L>| instance.parameters.latency.action = delay);
+        let mut period = |k: u32| {
             let at = |part: u32| (f64::from(k) + f64::from(part) / f64::from(parts)) * 0.2;
-            for part in 0..parts {
-                step(&mut instance, at(part), at(part + 1));
-            }
-            assert_eq!(
-                instance.output.moment, *expected,
-                "{parts} steps of an optimisation period, period {k}"
-            );
-        }
+            (0..parts).for_each(|part| step(&mut instance, at(part), at(part + 1)));
+            instance.output.moment
+        };
+        (0..10).map(&mut period).collect()
+    };
+    for more in &parts[1..] {
+        assert_eq!(moments(*more), moments(parts[0]), "{more} steps of an optimisation period");
     }
 }
 
 #[test]
 fn any_communication_steps_give_the_same_moments() {
     for delay in [0.0_f64, 0.117] {
-        // Beyond 0.053 s the guarantee cannot be given.
-        assert_any_communication_steps_give_the_same_moments::<CrmpcLaw>(delay.min(0.05));
-        assert_any_communication_steps_give_the_same_moments::<DlmpcLaw>(delay);
-        assert_any_communication_steps_give_the_same_moments::<TvsmcLaw<tvsmc::SotvsmcDo>>(delay);
+        // Beyond 0.053 s the guarantee cannot be given. CRMPC judges measurements of the present,
+        // which repeat here although the rates are not 0, and plans by its judgement. Those of a
+        // longer step are known to be old, and judged by nothing.
+        for parts in [[1, 3], [5, 10]] {
+            let within = delay.min(0.05);
+            assert_any_communication_steps_give_the_same_moments::<CrmpcLaw>(within, &parts);
+        }
+        let parts = [1, 3, 5, 10];
+        assert_any_communication_steps_give_the_same_moments::<DlmpcLaw>(delay, &parts);
+        assert_any_communication_steps_give_the_same_moments::<TvsmcLaw<tvsmc::SotvsmcDo>>(
+            delay, &parts,
+        );
     }
 }
 

@@ -71,6 +71,9 @@ pub enum Contradiction {
     /// scheduled.limitMoment has fallen, or scheduled.disturbanceBound risen, by more than the plan
     /// in force reserves.
     Schedule,
+    /// scheduled.angleError is larger than estimation.angleError and estimation.slowAngleError
+    /// together.
+    Errors,
 }
 
 /// Status of the guarantee that is shown.
@@ -109,7 +112,8 @@ impl Supervision {
                 Contradiction::Step
                 | Contradiction::KnownMoment
                 | Contradiction::Turn
-                | Contradiction::Schedule => PROBATION,
+                | Contradiction::Schedule
+                | Contradiction::Errors => PROBATION,
                 _ => PROBATION_OF_MEASUREMENTS,
             };
             self.probation = self.probation.max((probation / period).ceil() as u32);

@@ -91,7 +91,18 @@ impl Navigation {
         });
         let measured: [Measured; 3] =
             std::array::from_fn(|i| Measured::state(ATTITUDE + i, error[i], noise));
+        if running.misalignment == 0.0 {
+            let of_attitude = running.covariance.diagonal().fixed_rows::<3>(ATTITUDE).max();
+            let squares = self.gate(measured.len()) * measured.len() as f64;
+            running.misalignment = (squares * (of_attitude + noise * noise)).sqrt();
+        }
         self.judge(running, &measured, Source::Star, agrees);
+    }
+
+    /// Returns the mean of the normalised squares of this many components from which a measurement
+    /// is refused. The mean of several departs less from 1 than a single one.
+    fn gate(&self, size: usize) -> f64 {
+        (self.settings.fix.gate + 3.0 * (size - 1) as f64) / size as f64
     }
 
     /// Refuses a measurement of a device that contradicts itself.
@@ -122,8 +133,7 @@ impl Navigation {
             running.rejected += 1;
             return;
         }
-        // The mean of several squares departs less from 1 than a single one.
-        let gate = (self.settings.fix.gate + 3.0 * (size - 1) as f64) / size as f64;
+        let gate = self.gate(size);
         if squares <= gate {
             (watch.refused, watch.jumped) = (0, false);
             Self::apply(running, &error, &covariance, source);

@@ -21,7 +21,7 @@ pub use device::Navigation;
 pub use filter::{Covariance, Error, STATES};
 pub use line::{Contradiction, Health, Line};
 pub use settings::{Alignment, Drag, Errors, Fix, Initial, Settings, Trust, Wind};
-pub use shown::{Deviations, Shown};
+pub use shown::{Deviations, Protection, Shown};
 pub use strapdown::State;
 
 use running::{Running, UNSEEN_AFTER};
@@ -115,6 +115,7 @@ impl Navigation {
         let felt = Felt { rate: felt.rate + unbiased[0], force: felt.force + unbiased[1] };
         self.show(&mut shown, (time, &state), &felt, wind);
         (memory.health, memory.contradiction) = self.health(running, time, &shown.deviations);
+        shown.protection = self.protection(&shown.deviations, running.misalignment, memory.health);
         if shown.is_finite() {
             memory.shown = shown;
         } else {

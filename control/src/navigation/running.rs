@@ -71,6 +71,8 @@ pub(super) struct Running {
     /// (rad) with its time (s).
     pub(super) heard: Heard,
     pub(super) pointed: Option<(f64, Vector3<f64>)>,
+    /// Largest misalignment of the star tracker that its first fix could hide, rad; 0 before it.
+    pub(super) misalignment: f64,
     /// Disagreement with the filter of the positions (m) and attitudes (rad) with which it began
     /// anew, and the time of the last such event, s.
     pub(super) doubts: [f64; 2],
@@ -217,6 +219,7 @@ impl Navigation {
             watches: [Watch::default(); 4],
             heard: Heard::default(),
             pointed: None,
+            misalignment: 0.0,
             doubts: [0.0; 2],
             restarted: f64::NEG_INFINITY,
             rejected: 0,

@@ -4,16 +4,21 @@
 use super::air::Relative;
 use super::device::Navigation;
 use super::filter::{self, Covariance, Error, along};
+use super::line::Health;
 use super::strapdown::{Felt, State};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use settings::Declared;
+use std::f64::consts::PI;
 use vehicle::axes::{ANGLES, Entry, FLOW, HORIZONTAL, LETTERS, RATES, nearest};
 use vehicle::entry::{MOTION, Motion, NOMINALS, RATE_UNITS, UNITS, motion_rate};
 use vehicle::frames::{attitude_angles, fixed_from_inertial, level_from_fixed};
 use vehicle::math::sin_cos;
 use vehicle::platform::{body_from_velocity, velocity_from_level};
 use vehicle::trajectory::Trajectory;
+
+/// Number of standard deviations within which errors are protected.
+const PROTECTED: f64 = 3.0;
 
 /// Standard deviations that the filter predicts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
@@ -39,6 +44,22 @@ pub struct Deviations {
     /// Predicted standard deviation of drag.ratio, relative to it.
     #[setting(nominal = 0.1)]
     pub drag: f64,
+}
+
+/// Bounds on the errors that are shown (protection levels), which hold while nothing is suspect.
+///
+/// They are three of the predicted standard deviations, and for the angles at least one beyond the
+/// largest misalignment of the star tracker that its first fix could hide. While a contradiction
+/// stands, they bound nothing: half a turn, and the radius of the planet. docs/entry.md says how
+/// often errors exceed them, without and with faults.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Protection {
+    /// Bound on the error of each angle, relative to the air or to the ground velocity.
+    #[setting(unit = "rad", nominal = 0.01)]
+    pub attitude: f64,
+    /// Bound on the error of the position.
+    #[setting(unit = "m", nominal = 10.0)]
+    pub position: f64,
 }
 
 /// The navigated state.
@@ -74,6 +95,8 @@ pub struct Shown {
     /// Standard deviations that the filter predicts.
     #[setting(name = "deviation")]
     pub deviations: Deviations,
+    /// Bounds on the errors.
+    pub protection: Protection,
     /// Square of the normalised innovation per component of the latest {}, 1 on average.
     #[setting(name = "innovation", each = SOURCES)]
     pub innovations: [f64; 4],
@@ -155,6 +178,26 @@ impl Navigation {
             wind: [0, 1].map(|i| covariance[(filter::WIND + i, filter::WIND + i)].max(0.0).sqrt()),
             altitude: of(&altitude),
             drag: covariance[(filter::DRAG, filter::DRAG)].max(0.0).sqrt(),
+        }
+    }
+
+    /// Returns the bounds on the errors that are shown, given the largest misalignment (rad) that
+    /// the star tracker can have.
+    pub(super) fn protection(
+        &self,
+        Deviations { angles, flow, position, .. }: &Deviations,
+        misalignment: f64,
+        health: Health,
+    ) -> Protection {
+        let knows = matches!(health, Health::Aided | Health::Bridging | Health::Degraded);
+        if !knows {
+            return Protection { attitude: PI, position: self.settings.planet.radius };
+        }
+        let deviation = angles.max().max(flow[0]).max(flow[1]);
+        let hidden = if misalignment > 0.0 { misalignment + deviation } else { 0.0 };
+        Protection {
+            attitude: (PROTECTED * deviation).max(hidden).min(PI),
+            position: PROTECTED * 3_f64.sqrt() * position,
         }
     }
 

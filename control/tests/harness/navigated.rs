@@ -232,6 +232,17 @@ pub(crate) struct Seen {
     pub(crate) contradiction: navigation::Contradiction,
     /// Shown less true position (m), and its predicted standard deviation along an axis, m.
     pub(crate) position_error: [f64; 2],
+    /// Bounds on the errors that the navigation states.
+    pub(crate) protection: navigation::Protection,
+}
+
+impl Seen {
+    /// Returns whether the error of an angle, and that of the position, are within their bounds.
+    pub(crate) fn is_protected(&self) -> [bool; 2] {
+        let [_, _, sigma, alpha, beta] = self.errors.map(f64::abs);
+        let largest = alpha.max(beta).max(sigma);
+        [largest <= self.protection.attitude, self.position_error[0] <= self.protection.position]
+    }
 }
 
 /// Returns the entry flight of a case, and the plant with its sensors.
@@ -345,6 +356,7 @@ pub(crate) fn fly(case: &Case, mut see: impl FnMut(&Seen)) {
                 innovations: shown.innovations,
                 health: memory.health,
                 contradiction: memory.contradiction,
+                protection: shown.protection,
                 position_error: {
                     let place = Place::of(&entry.planet, &shown.motion, &shown.angles, time);
                     let off = (place.position - truth.position).norm();

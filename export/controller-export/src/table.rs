@@ -31,6 +31,7 @@ fn table<L: Law>() -> VariableTable<ControllerFmu<L>> {
     let achieved = condition("achievedMoment.used", "achievedMoment.used = true");
     let parts = "constraints = robust and scheduled.disturbanceParts > 1";
     let parts = condition("scheduled.disturbanceParts", parts);
+    let robust = condition("constraints", "constraints = robust");
     // The reference that is shown may be that of the inputs.
     let external = |variable: &mut Variable| {
         if variable.causality == Causality::Output {
@@ -45,6 +46,7 @@ fn table<L: Law>() -> VariableTable<ControllerFmu<L>> {
             }
         })
         .change("scheduled.disturbanceBound", |variable| variable.use_with(parts))
+        .change("scheduled.angleError", |variable| variable.use_with(robust))
         .change("reference", external);
     let has_file = settings::settings::<L::Settings>()
         .iter()

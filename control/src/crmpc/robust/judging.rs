@@ -50,7 +50,10 @@ impl Robust {
             && (measured.rates - measured.turn).norm() <= self.design.tightening.explained.rate;
         let Feedback { deviation, nominal, commanded } = feedback;
         let explained = self.explains(memory, tick.within, deviation, &(commanded - nominal));
+        let Settings { angle_error, slow_angle_error, .. } = self.settings;
+        let declared = keeps(measured.scheduled.angle_error, angle_error + slow_angle_error);
         let assumed = [
+            (declared, Contradiction::Errors),
             (self.keeps_turn(memory, measured), Contradiction::Turn),
             (self.keeps_known_moment(memory, measured), Contradiction::KnownMoment),
             (self.keeps_schedule(memory), Contradiction::Schedule),
@@ -105,7 +108,8 @@ impl Robust {
 
     /// Returns whether the scheduled limits are still those that a plan in force assumes.
     fn keeps_schedule(&self, memory: &Memory) -> bool {
-        let Memory { plan, scheduled: Scheduled { limit_moment, disturbance_bound }, .. } = memory;
+        let Memory { plan, scheduled: Scheduled { limit_moment, disturbance_bound, .. }, .. } =
+            memory;
         let level = memory.acting.terms().map_or(0, |terms| terms.level).max(plan.terms.level);
         !memory.assured()
             || keeps(plan.terms.limit_moment, *limit_moment)
