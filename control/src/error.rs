@@ -160,6 +160,8 @@ pub struct Refusal {
     /// Largest accepted disturbance.bound with the other settings unchanged, rad/s²; `None`
     /// if not even 0 is accepted.
     pub disturbance: Option<f64>,
+    /// The same with the gain by rule, if another one is set.
+    pub by_rule: Option<f64>,
     /// Largest accepted knownMoment.bound, N m.
     pub known_bound: Option<f64>,
     /// Largest accepted errors of angles (rad) and rates (rad/s) in the given proportion.
@@ -186,6 +188,7 @@ fn no_guarantee(refusal: &Refusal) -> String {
         limit_moment,
         limit_rate,
         disturbance,
+        by_rule,
         known_bound,
         errors,
         slow_errors,
@@ -198,8 +201,8 @@ fn no_guarantee(refusal: &Refusal) -> String {
     ] {
         if left <= 0.0 {
             reasons.push(format!(
-                "the {what} required under the worst disturbance exceeds {limit} by {:.1} %",
-                -100.0 * left
+                "the {what} required under the worst disturbance exceeds {limit} by {} %",
+                up(-100.0 * left)
             ));
         }
     }
@@ -223,6 +226,12 @@ fn no_guarantee(refusal: &Refusal) -> String {
         }
         None => accepted.push("no disturbance.bound".into()),
     }
+    if let Some(bound) = by_rule {
+        accepted.push(format!(
+            "with the gain by rule, feedback.k1 = feedback.k2 = 0, at most disturbance.bound = {:.4} deg/s2",
+            down(bound.to_degrees())
+        ));
+    }
     if let Some((angle, rate)) = errors {
         accepted.push(format!(
             "at most estimation.angleError = {:.4} deg with estimation.rateError = {:.4} deg/s",
@@ -245,6 +254,11 @@ fn no_guarantee(refusal: &Refusal) -> String {
         reasons.join(" and "),
         accepted.join(", or ")
     )
+}
+
+/// Returns the value rounded up to one digit after the point, so that no excess is told as none.
+fn up(value: f64) -> f64 {
+    (value * 10.0).ceil() / 10.0
 }
 
 /// Returns the value rounded down to four digits after the point, so that the printed number is

@@ -17,6 +17,9 @@ fn largest(tried: f64, closest: Gain, with: impl Fn(f64) -> Settings) -> Option<
             let tightened = guarantee::tighten(&Settings { feedback, ..with(value) });
             tightened.is_ok_and(|(_, assessment)| assessment.holds())
         };
+        if holds(tried) {
+            return Some(tried);
+        }
         let mut low = so_far.unwrap_or(0.0);
         if !holds(low) {
             return so_far;
@@ -34,6 +37,12 @@ fn largest(tried: f64, closest: Gain, with: impl Fn(f64) -> Settings) -> Option<
 /// with the gain that is set.
 pub(super) fn largest_share(s: &Settings) -> Option<f64> {
     largest(1.0, s.feedback, |share| guarantee::with_share(s, share))
+}
+
+/// Returns the largest Δ̄ for which the design holds with a gain by rule.
+fn by_rule(s: &Settings) -> Option<f64> {
+    let with = |disturbance_bound| Settings { disturbance_bound, feedback: Gain::default(), ..*s };
+    largest(s.disturbance_bound, *rule::candidates(&with(0.0)).first()?, with)
 }
 
 /// Returns the error that says why the guarantee cannot be given with the gain that comes closest,
@@ -63,6 +72,7 @@ pub(super) fn refusal(s: &Settings, closest: &Tightened) -> DesignError {
             disturbance_bound,
             ..*s
         }),
+        by_rule: (s.feedback != Gain::default()).then(|| by_rule(s)).flatten(),
         known_bound: (s.known_bound > 0.0)
             .then(|| largest(s.known_bound, &|known_bound| Settings { known_bound, ..*s }))
             .flatten(),

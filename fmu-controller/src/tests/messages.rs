@@ -38,6 +38,10 @@ fn refusals() -> Vec<String> {
             |instance| instance.settings.disturbance_bound = -1.0,
             |instance| instance.settings.feedback = Gain { k1: -700.0, k2: -50.0 },
             |instance| instance.settings.feedback = Gain { k1: -1.5, k2: 0.0 },
+            |instance| {
+                instance.settings.feedback = Gain { k1: -5.0, k2: -5.0 };
+                instance.settings.disturbance_bound = 2.5_f64.to_radians();
+            },
             |instance| instance.settings.terminal = Gain { k1: -1.0, k2: -1.0 },
             |instance| instance.settings.terminal = Gain { k1: -20.0, k2: -11.0 },
             |instance| instance.settings.tube = Gain { k1: -1.0, k2: -1.0 },
