@@ -214,7 +214,8 @@ fn metric_lines(observe: &Observe, metrics: &Metrics) -> Vec<SummaryLine> {
         };
         let number = |name: &String| metrics.number(name);
         let (compared, is_within) = match (number(name), measure.limit.as_ref().and_then(number)) {
-            (Some(value), Some(limit)) => {
+            // What stays 0 throughout was hardly computed, as the heating of a vehicle without one.
+            (Some(value), Some(limit)) if value != 0.0 => {
                 let (text, is) =
                     against(value / limit, &format!("{}{unit}", shown(factor * limit)));
                 (text, Some(is))
@@ -319,11 +320,12 @@ mod tests {
     fn metrics_of_one_heading_share_a_line_and_limits_are_told() {
         let observe: Observe = toml::from_str(
             r#"
-            summary = ["mean", "largest", "rate", "missing"]
+            summary = ["mean", "largest", "rate", "heat", "missing"]
             [metrics]
             mean = { label = "time", part = "mean", kind = "mean", signals = "x" }
             largest = { label = "time", part = "max", kind = "largest", signals = "x" }
             rate = { label = "largest rate", kind = "largest", signals = "y", limit = "limit" }
+            heat = { label = "heat flux", kind = "largest", signals = "y", limit = "limit" }
             limit = { kind = "last", signals = "z" }
             missing = { label = "count", kind = "last", signals = "z" }
             "#,
@@ -333,6 +335,7 @@ mod tests {
             ("mean", Some(0.0004)),
             ("largest", Some(2.0)),
             ("rate", Some(6.0)),
+            ("heat", Some(0.0)),
             ("limit", Some(5.0)),
             ("missing", None),
         ];
@@ -350,6 +353,7 @@ mod tests {
             [
                 line("time", "mean 4.0000e-4 ms, max 2.0000 ms", None),
                 line("largest rate", "6.0000   EXCEEDS its limit 5.0000: 120.0 %", Some(false)),
+                line("heat flux", "0.0000", None),
             ]
         );
     }
