@@ -4,9 +4,8 @@ use crate::catalogue::Filter;
 use crate::run::Files;
 use crate::{campaign, examples, margins, plot, schema};
 use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
-use cosim::choice::choice;
 use cosim::experiment::{Overrides, Process};
-use cosim::pacing::{Factor, OnMiss};
+use cosim::pacing::Factor;
 use std::path::PathBuf;
 
 /// Runs experiments with FMUs of FMI 2.0 and 3.0, for co-simulation or model exchange.
@@ -70,16 +69,9 @@ pub(crate) enum Command {
         #[arg(long, help_heading = "Display")]
         quiet: bool,
         /// Keep the run in step with the wall clock, FACTOR times as fast as real time. FACTOR is 1
-        /// if it is left out.
-        #[arg(long, value_name = "FACTOR", num_args = 0..=1, default_missing_value = "1",
-              help_heading = "Real time")]
+        /// if it is left out. A late run continues at once, and missed deadlines are counted.
+        #[arg(long, value_name = "FACTOR", num_args = 0..=1, default_missing_value = "1")]
         real_time: Option<Factor>,
-        /// Choose what happens after a missed deadline, that is, if the values that a component
-        /// computes at one of its communication points are not ready at its next one. All missed
-        /// deadlines are counted and reported.
-        #[arg(long, value_parser = choice::<OnMiss>(&[]), default_value = "catch-up", requires = "real_time",
-              help_heading = "Real time")]
-        on_miss: OnMiss,
         #[command(flatten)]
         files: Files,
         /// Replace the results of an earlier run in the folder. Without this option they are left

@@ -2,10 +2,8 @@
 
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
-use cosim::pacing::Settings;
-use cosim::pacing::pacer::Pacer;
-use cosim::pacing::report::RealTime;
 use cosim::pacing::timer::{self, Monotonic};
+use cosim::pacing::{Factor, Pacer, RealTime};
 use cosim::run::{Observer, Sample};
 use cosim::system::{Parameters, System};
 use fmu_import::isolation::{Closed, Closing, Link};
@@ -55,7 +53,7 @@ pub(crate) struct Flown {
 /// Returns an error if the run could not begin.
 pub(crate) fn fly(
     system: &System,
-    real_time: Option<Settings>,
+    real_time: Option<Factor>,
     interrupt: &Interrupt,
     heard: &mut dyn Heard,
 ) -> Result<Flown, Error> {
@@ -71,7 +69,7 @@ pub(crate) fn fly(
 /// Flies a run in this process. `tell` is called before the instances are freed.
 fn fly_here(
     system: &System,
-    real_time: Option<Settings>,
+    real_time: Option<Factor>,
     interrupt: &Interrupt,
     heard: &mut dyn Heard,
     tell: impl FnOnce(&Flown),
@@ -80,8 +78,8 @@ fn fly_here(
     warnings::at(system.clock.start());
     let mut run = system.start(interrupt)?;
     heard.begin(system.parameters(&mut run)?)?;
-    if let Some(settings) = real_time {
-        run.pace(settings, Rc::new(Monotonic));
+    if let Some(factor) = real_time {
+        run.pace(factor, Rc::new(Monotonic));
     }
     let begin = Instant::now();
     let outcome = run.run(&mut [heard]);
@@ -160,7 +158,7 @@ impl Heard for Teller<'_> {
 fn fly_closed(
     system: &System,
     closing: &Closing,
-    (real_time, interrupt): (Option<Settings>, &Interrupt),
+    (real_time, interrupt): (Option<Factor>, &Interrupt),
     heard: &mut dyn Heard,
 ) -> Result<Flown, Error> {
     let begin = Instant::now();

@@ -24,7 +24,6 @@ use command_line::{Command, definition};
 use cosim::error::Error;
 use cosim::experiment::{Overrides, Process};
 use cosim::interrupt::Interrupt;
-use cosim::pacing;
 use cosim::search::named::{Kind, find};
 use failure::Failure;
 use fmu_import::crash;
@@ -110,11 +109,9 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             overrides,
             quiet,
             real_time,
-            on_miss,
             files,
             force,
         } => {
-            let real_time = real_time.map(|factor| pacing::Settings { factor, on_miss });
             let options = Options {
                 out: folder,
                 quiet,

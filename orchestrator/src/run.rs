@@ -10,8 +10,7 @@ use cosim::experiment::{Experiment, Overrides};
 use cosim::files;
 use cosim::interrupt::Interrupt;
 use cosim::metadata;
-use cosim::pacing;
-use cosim::pacing::report::RealTime;
+use cosim::pacing::{Factor, RealTime};
 use cosim::recorder::{FILE, Recorder};
 use cosim::run::{Observer, Sample};
 use cosim::ssp;
@@ -63,8 +62,8 @@ pub(crate) struct Options {
     pub(crate) out: Option<PathBuf>,
     /// Whether the progress display is suppressed.
     pub(crate) quiet: bool,
-    /// Settings of a run that is paced by the wall clock; `None` runs as fast as possible.
-    pub(crate) real_time: Option<pacing::Settings>,
+    /// Factor of a run that is paced by the wall clock; `None` runs as fast as possible.
+    pub(crate) real_time: Option<Factor>,
     /// Choice of the files that the run writes.
     pub(crate) files: Files,
     /// Whether the results of an earlier run may be replaced.
@@ -127,8 +126,7 @@ fn early(outcome: Result<(), Error>, out: &Path) -> Result<Option<Error>, Error>
     match outcome {
         Ok(()) => Ok(None),
         Err(
-            error @ (Error::Deadline { .. }
-            | Error::Interrupted { .. }
+            error @ (Error::Interrupted { .. }
             | Error::EndedByInstance { .. }
             | Error::Lost { .. }),
         ) => Ok(Some(error)),
@@ -242,7 +240,9 @@ impl<'a> Outputs<'a> {
         let mut metrics = self.measured(wall);
         metrics.asked.extend(margins?);
         if let Some(real_time) = real_time {
-            warn(&real_time, options.quiet);
+            if options.quiet && real_time.worst_miss.is_some() {
+                tracing::warn!("real time: {real_time}");
+            }
             metrics.real_time = Some(real_time);
         }
         files::write_json(&self.out.join("metrics.json"), &metrics)?;
@@ -311,15 +311,5 @@ impl Observer for Outputs<'_> {
         recorder.as_mut().map_or(Ok(()), |recorder| recorder.observe(sample))?;
         // The meters come last, because they may end the run.
         meters.observe(sample)
-    }
-}
-
-/// Warns of missed deadlines if no summary is printed.
-fn warn(real_time: &RealTime, quiet: bool) {
-    if !quiet {
-        return;
-    }
-    if let Some(done) = real_time.done_about_it() {
-        tracing::warn!("{} of {} deadlines missed; {done}", real_time.misses, real_time.deadlines);
     }
 }

@@ -108,9 +108,8 @@ pub(crate) fn summary(system: &System, report: &RunReport, out: &mut impl Write)
         line(label, ended.to_string())?;
     }
     if let Some(real_time) = &metrics.real_time {
-        real_time.print(&names, out)?;
+        line("real time", real_time.to_string())?;
     }
-    let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
     line("results", format!("{}: {}", report.out.display(), report.files.join(", ")))
 }
 

@@ -43,19 +43,6 @@ pub enum Error {
         /// Message of the instance, in its own words.
         message: String,
     },
-    /// A deadline was missed in a run that was to end in this case.
-    #[error(
-        "{component} missed its deadline at t = {} s by {late_ms:.3} ms, which ends the run, as --on-miss stop asks",
-        rounded(*time)
-    )]
-    Deadline {
-        /// Name of the component whose values were late.
-        component: String,
-        /// Simulated time of the communication point, s.
-        time: f64,
-        /// Time from the deadline until the values were ready, ms.
-        late_ms: f64,
-    },
     /// Signals exceeded the bound beyond which the experiment counts a run as lost, or its goal as
     /// missed.
     #[error("{what} at t = {} s: {reason}", rounded(*time))]
@@ -130,7 +117,6 @@ impl Error {
             Self::Lost { .. } => 3,
             Self::Call { .. }
             | Self::EndedByInstance { .. }
-            | Self::Deadline { .. }
             | Self::Import(Import::File { .. })
             | Self::File { .. } => 1,
         }

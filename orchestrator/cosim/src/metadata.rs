@@ -3,7 +3,7 @@
 
 use crate::error::Error;
 use crate::files::digest;
-use crate::pacing;
+use crate::pacing::Factor;
 use crate::system::{CheckedComponent, Parameters, System};
 use fmi_master::description::InterfaceKind;
 use serde_json::{Value, json};
@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 pub fn metadata(
     system: &System,
     parameters: &Parameters,
-    real_time: Option<pacing::Settings>,
+    real_time: Option<Factor>,
     failure: Option<&Error>,
 ) -> Value {
     let experiment = &system.experiment;
@@ -69,7 +69,7 @@ pub fn metadata(
             "start": simulation.start, "stop": simulation.stop, "step": simulation.step,
             "steps": system.clock.ticks(), "coupling": simulation.coupling, "order": system.names(),
         },
-        "real_time": real_time.map(|s| json!({ "factor": s.factor, "on_miss": s.on_miss })),
+        "real_time": real_time.map(|factor| json!({ "factor": factor })),
         "components": components,
         "seeds": seeds,
         "connections": connections,

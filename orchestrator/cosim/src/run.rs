@@ -3,8 +3,7 @@
 
 use crate::error::Error;
 use crate::interrupt::Interrupt;
-use crate::pacing::Settings;
-use crate::pacing::pacer::Pacer;
+use crate::pacing::{Factor, Pacer};
 use crate::pacing::timer::{Monotonic, Timer};
 use crate::stopwatch::{Spent, Stopwatch};
 use fmi_master::master::{Failed, Master, Member, Watcher};
@@ -40,13 +39,13 @@ impl Run {
     }
 
     /// Paces the run from now on, so that it keeps in step with the timer.
-    pub fn pace(&mut self, settings: Settings, timer: Rc<dyn Timer>) {
+    pub fn pace(&mut self, factor: Factor, timer: Rc<dyn Timer>) {
         self.measure(&timer);
         let spent = self.master.members.iter().zip(&self.spent);
         let components =
             spent.map(|(member, spent)| (member.name.clone(), member.every, Rc::clone(spent)));
         let (clock, interrupt) = (self.master.clock(), self.interrupt.clone());
-        self.pacer = Some(Pacer::new(settings, clock, timer, interrupt, components));
+        self.pacer = Some(Pacer::new(factor, clock, timer, interrupt, components));
     }
 
     /// Removes the pacer that kept the run in step and returns it; `None` if the run was not paced.
@@ -80,17 +79,12 @@ impl Run {
     /// Runs from the start time to the stop time.
     ///
     /// # Errors
-    /// Returns an error if an instance or an observer fails, if a missed deadline is to end the
-    /// run, or if the run was asked to end. The observers have seen all communication points up to
-    /// then.
+    /// Returns an error if an instance or an observer fails, or if the run was asked to end. The
+    /// observers have seen all communication points up to then.
     pub fn run(&mut self, observers: &mut [&mut dyn Observer]) -> Result<(), Error> {
         let Self { master, pacer, interrupt, .. } = self;
         let mut watch = Watch { pacer: pacer.as_mut(), interrupt, is_step: false, observers };
-        let outcome = master.run(&mut watch);
-        if let Some(pacer) = pacer {
-            pacer.finish();
-        }
-        outcome
+        master.run(&mut watch)
     }
 
     /// Does the steps of this tick, which must follow the last one; tick 0 follows initialization.
@@ -135,14 +129,14 @@ impl Watcher for Watch<'_, '_> {
     }
 
     fn after(&mut self, sample: &Sample, outcome: Result<(), Failed>) -> Result<(), Error> {
-        let deadlines = match &mut self.pacer {
-            Some(pacer) if std::mem::take(&mut self.is_step) => pacer.check(sample.tick),
-            _ => Ok(()),
-        };
+        if let Some(pacer) = &mut self.pacer
+            && std::mem::take(&mut self.is_step)
+        {
+            pacer.check(sample.tick);
+        }
         for observer in self.observers.iter_mut() {
             observer.observe(sample)?;
         }
-        outcome.map_err(|failed| Error::from(failed).or(self.interrupt.asked()))?;
-        deadlines
+        outcome.map_err(|failed| Error::from(failed).or(self.interrupt.asked()))
     }
 }

@@ -5,7 +5,7 @@ use crate::guarantee::{GuaranteeRecord, GuaranteeSignals};
 use crate::measure::{self, Gauge};
 use cosim::error::Error;
 use cosim::experiment::{self, Guarantee, Margins, Observe};
-use cosim::pacing::report::RealTime;
+use cosim::pacing::RealTime;
 use cosim::run::{Observer, Sample};
 use cosim::signal::{Resolved, Signal, common_unit};
 use cosim::system::System;

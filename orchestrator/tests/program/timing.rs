@@ -14,56 +14,38 @@ fn a_run_in_real_time_takes_its_time() {
     let begin = Instant::now();
     let summary = bench.flown(&["--stop", "2", "--real-time", "2"]);
     assert!(begin.elapsed() >= Duration::from_secs(1));
-    assert!(summary.contains("real time         factor 2: 0 of 4 deadlines missed"), "{summary}");
-    let real_time = &bench.json("out/loop/metrics.json")["real_time"];
-    assert!(real_time["elapsed_s"].as_f64().unwrap() >= 1.0);
-    assert_eq!(real_time["components"]["plant"]["step_ms"]["count"], 2);
-    // The first communication point is not waited for.
-    assert_eq!(real_time["components"]["plant"]["wake_up_ms"]["count"], 1);
-    assert_eq!(bench.json("out/loop/results.json")["real_time"]["on_miss"], "catch-up");
+    assert!(summary.contains("real time         factor 2: 0 of 4 deadlines missed\n"), "{summary}");
+    let metrics = bench.json("out/loop/metrics.json");
+    assert!(metrics["wall_s"].as_f64().unwrap() >= 1.0);
+    assert_eq!(metrics["real_time"]["misses"]["plant"], 0);
+    assert_eq!(bench.json("out/loop/results.json")["real_time"]["factor"], 2.0);
 }
 
 /// A real-time factor that leaves a nanosecond for each step, which no machine can keep.
 const IMPOSSIBLE: &str = "1e9";
 
 #[test]
-fn every_missed_deadline_is_counted_and_what_was_done_is_said() {
+fn every_missed_deadline_is_counted() {
     let bench = Bench::new();
     let (_, _, _) = bench.run(&["--out", "usual"]);
-    let said = "went on at once, 3 times";
     let (code, summary, errors) = bench.run(&["--real-time", IMPOSSIBLE]);
     assert_eq!(code, 0, "{errors}");
-    for text in [": 6 of 6 deadlines missed", said, "first miss        gain at t = 0 s, "] {
-        assert!(summary.contains(text), "{text}: {summary}");
-    }
+    assert!(summary.contains(": 6 of 6 deadlines missed; at worst "), "{summary}");
     // The results are those of a run without pacing.
     let rows = |out: &str| fs::read(bench.path(out).join("results.csv")).unwrap();
     assert_eq!(rows("out/loop"), rows("usual"));
     let (_, _, errors) = bench.run(&["--real-time", IMPOSSIBLE, "--quiet"]);
-    assert!(errors.contains("6 of 6 deadlines missed") && errors.contains(said), "{errors}");
-    let (code, summary, errors) = bench.run(&["--real-time", IMPOSSIBLE, "--on-miss", "stop"]);
-    assert_eq!(code, 1);
-    assert!(errors.contains("error: gain missed its deadline at t = 0 s by "), "{errors}");
-    assert!(summary.contains("2 of 2 deadlines missed"), "{summary}");
-    assert_eq!(bench.results().lines().count(), 2);
-    assert_eq!(bench.json("out/loop/metrics.json")["completed"], false);
-    let status = bench.json("out/loop/results.json")["status"].as_str().unwrap().to_string();
-    assert!(status.starts_with("failed: gain missed its deadline"), "{status}");
+    assert!(errors.contains("6 of 6 deadlines missed"), "{errors}");
 }
 
 #[test]
 fn a_slow_component_is_named() {
     let bench = Bench::new();
     // There are 20 ms from tick to tick, but a step of the plant takes 50 ms.
-    let summary = bench.flown(&["--real-time", "50", "--set", "plant.pause=0.05"]);
-    let worst = summary.lines().find(|line| line.contains("worst miss")).unwrap();
-    assert!(worst.contains("longest step since the last wait: plant, "), "{worst}");
+    bench.flown(&["--real-time", "50", "--set", "plant.pause=0.05"]);
     let real_time = &bench.json("out/loop/metrics.json")["real_time"];
-    let plant = &real_time["components"]["plant"];
-    // The histogram has three digits.
-    assert!(plant["step_ms"]["max"].as_f64().unwrap() >= 49.9, "{plant}");
     // The tick at the start needs no step.
-    assert!(plant["misses"].as_u64().unwrap() >= 3, "{plant}");
+    assert!(real_time["misses"]["plant"].as_u64().unwrap() >= 3, "{real_time}");
     assert!(real_time["worst_miss"]["late_ms"].as_f64().unwrap() >= 29.9, "{real_time}");
 }
 
@@ -78,7 +60,6 @@ fn factors_that_make_no_sense_are_refused() {
     let (code, _, errors) = bench.call(&["run", "--real-time", "loop.toml"]);
     assert_eq!(code, 2);
     assert!(errors.contains("write the experiment before --real-time"), "{errors}");
-    assert_eq!(bench.run(&["--on-miss", "stop"]).0, 2);
 }
 
 /// Starts the program, sends it a signal once the file `awaited` exists, and returns its exit code.
