@@ -1,10 +1,12 @@
 //! The command `campaign`.
 
+use crate::command_line::{Many, Subject};
 use crate::failure::Failure;
+use crate::run::{self, Run};
 use campaign::definition::Campaign;
 use campaign::findings::Findings;
 use campaign::plan::{Changes, Plan};
-use campaign::run;
+use campaign::run as flights;
 use campaign::search::{self, SearchOutcome};
 use clap::Args;
 use cosim::error::Error;
@@ -16,8 +18,6 @@ use std::env;
 use std::io::Write;
 use std::ops::Range;
 use std::path::PathBuf;
-use std::time::Duration;
-use sweep::runner::Options;
 use sweep::statistics::CONFIDENCE;
 
 /// Options of `campaign`.
@@ -35,23 +35,8 @@ pub(crate) struct Fly {
     /// Begin no further cases of the search after this time, s.
     #[arg(long, value_name = "SECONDS", help_heading = "Search", requires = "worst", value_parser = clap::value_parser!(u64).range(1..))]
     time: Option<u64>,
-    /// Folder for the results [default: out/CAMPAIGN, for a search out/CAMPAIGN-worst].
-    #[arg(long, value_name = "DIR", help_heading = "Results")]
-    out: Option<PathBuf>,
-    /// Fly all cases again, including those that are finished, and replace the results of an
-    /// earlier search.
-    #[arg(long, visible_alias = "force", help_heading = "Results")]
-    fresh: bool,
-    /// Also look for FMUs in this folder, besides those of the experiment and the program. The
-    /// option may be given several times.
-    #[arg(long, value_name = "DIR")]
-    fmu_dir: Vec<PathBuf>,
-    /// Number of threads [default: one for each core].
-    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
-    jobs: usize,
-    /// Show neither progress nor summary.
-    #[arg(long)]
-    quiet: bool,
+    #[command(flatten)]
+    many: Many,
     // The headings of these would apply to all arguments that follow.
     #[command(flatten)]
     part: Part,
@@ -98,38 +83,31 @@ pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> R
     };
     let experiment = asked.experiment.clone();
     let changes = Changes { experiment, overrides: overrides.clone(), command };
-    let plan = Plan::new(campaign, changes, &asked.fmu_dir)?;
-    let folder = run::folder(&plan, asked.out.as_deref());
+    let plan = Plan::new(campaign, changes, &asked.many.fmu_dir)?;
+    let folder = flights::folder(&plan, asked.many.out.as_deref());
     if asked.part.work {
-        let work =
-            serde_json::to_string(&run::remaining(&plan, &folder)).map_err(std::io::Error::from)?;
+        let work = serde_json::to_string(&flights::remaining(&plan, &folder))
+            .map_err(std::io::Error::from)?;
         writeln!(out, "{work}")?;
         return Ok(());
     }
     if let Some(case) = asked.part.case {
         return fly_case(&plan, case, asked, overrides, out, interrupt);
     }
-    let options = Options {
-        out: asked.out.clone(),
-        jobs: asked.jobs,
-        fresh: asked.fresh,
-        time: asked.time.map(Duration::from_secs),
-        quiet: asked.quiet,
-        interrupt: interrupt.clone(),
-    };
+    let options = asked.many.options(asked.time, interrupt);
     if asked.worst {
         let outcome = search::search(&plan, &options)?;
-        if !asked.quiet {
+        if !asked.many.quiet {
             worst(&outcome, out)?;
         }
     } else if let Some(cases) = &asked.part.cases {
-        let flown = run::fly_range(&plan, cases, &options)?;
-        if !asked.quiet {
+        let flown = flights::fly_range(&plan, cases, &options)?;
+        if !asked.many.quiet {
             writeln!(out, "{flown} cases flown, kept in {}", folder.join("parts").display())?;
         }
     } else {
-        let report = run::fly(&plan, &options)?;
-        if !asked.quiet {
+        let report = flights::fly(&plan, &options)?;
+        if !asked.many.quiet {
             summary(&report, out)?;
         }
     }
@@ -168,24 +146,20 @@ fn fly_case(
         let message = format!("--case {case}: the campaign has {cases} cases, counted from 0");
         return Err(Error::experiment(message).into());
     }
-    let folder = asked.out.clone();
+    let folder = asked.many.out.clone();
     let folder =
-        folder.unwrap_or_else(|| run::folder(plan, None).join("cases").join(case.to_string()));
+        folder.unwrap_or_else(|| flights::folder(plan, None).join("cases").join(case.to_string()));
     let (_, experiment) = plan.write_case(case, &folder)?;
-    let options = crate::run::Options {
-        out: Some(folder),
-        quiet: asked.quiet,
-        force: true,
-        interrupt: interrupt.clone(),
-        ..Default::default()
-    };
     let Overrides { law, process, .. } = overrides;
     let overrides = Overrides { law, process, ..Overrides::default() };
     law::in_case(Some(case));
-    crate::run::run(&experiment, &overrides, &asked.fmu_dir, &options, out)
+    let subject = Subject { experiment, fmu_dir: asked.many.fmu_dir.clone(), overrides };
+    let quiet = asked.many.quiet;
+    let run = Run { subject, out: Some(folder), quiet, force: true, ..Run::default() };
+    run::run(&run, out, interrupt)
 }
 
-fn summary(report: &run::CampaignReport, out: &mut impl Write) -> std::io::Result<()> {
+fn summary(report: &flights::CampaignReport, out: &mut impl Write) -> std::io::Result<()> {
     let Findings { title, cases, status, limits, measures, answer } = &report.findings;
     let rate = report.flown as f64 / report.elapsed;
     writeln!(out, "{title}")?;

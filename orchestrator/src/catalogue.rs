@@ -1,61 +1,9 @@
-//! Chooses which variables of an FMU are shown, and prints everything that is known about them as
-//! JSON.
+//! Prints everything that is known about the variables of an FMU as JSON.
 
-use cosim::error::Error;
 use fmi_master::description::{Interface, ModelDescription, Variable, VariableKind};
-use fmi_master::names;
 use fmu_import::fmu::Fmu;
 use serde_json::{Value, json};
 use std::io::{self, Write};
-
-/// Choice of the variables that are shown.
-#[derive(Clone, Debug, Default, clap::Args)]
-pub(crate) struct Filter {
-    /// Show only these variables: a name, a pattern with *, or a part of a name. Without it all
-    /// variables are shown.
-    pub(crate) pattern: Option<String>,
-    /// Show only variables of this causality: parameter, calculatedParameter, input, output, local
-    /// or independent.
-    #[arg(long)]
-    pub(crate) causality: Option<String>,
-}
-
-impl Filter {
-    fn fits(&self, variable: &Variable) -> bool {
-        let by_name = self.pattern.as_ref().is_none_or(|pattern| {
-            names::matches(pattern, &variable.name)
-                || (!pattern.contains('*')
-                    && variable.name.to_lowercase().contains(&pattern.to_lowercase()))
-        });
-        by_name && self.causality.as_ref().is_none_or(|causality| *causality == variable.causality)
-    }
-
-    /// Removes the variables that do not fit from a description.
-    ///
-    /// # Errors
-    /// Returns an error if no variable fits.
-    pub(crate) fn apply(&self, description: &mut ModelDescription) -> Result<(), Error> {
-        if self.pattern.is_none() && self.causality.is_none() {
-            return Ok(());
-        }
-        let names: Vec<String> = description.variables.iter().map(|v| v.name.clone()).collect();
-        description.variables.retain(|variable| self.fits(variable));
-        if !description.variables.is_empty() {
-            return Ok(());
-        }
-        let causality =
-            self.causality.as_ref().map_or(String::new(), |c| format!(" of causality {c}"));
-        let (name, hint) =
-            self.pattern.as_ref().map_or((String::new(), String::new()), |pattern| {
-                (
-                    format!(" that fits \"{pattern}\""),
-                    names::hint(pattern, names.iter().map(String::as_str)),
-                )
-            });
-        let model = &description.model_name;
-        Err(Error::experiment(format!("{model} has no variable{causality}{name}{hint}")))
-    }
-}
 
 /// Prints the description of an archive as JSON.
 ///

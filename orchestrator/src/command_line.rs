@@ -1,12 +1,17 @@
 //! The command line: commands, their arguments and help texts.
 
-use crate::catalogue::Filter;
-use crate::run::Files;
-use crate::{campaign, examples, margins, plot, schema};
-use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
-use cosim::experiment::{Overrides, Process};
-use cosim::pacing::Factor;
-use std::path::PathBuf;
+use crate::failure::Failure;
+use crate::{campaign, examples, inspect, margins, pack, plot, reproduce, run, schema};
+use clap::{Arg, Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use cosim::check::check;
+use cosim::experiment::{Experiment, Overrides};
+use cosim::interrupt::Interrupt;
+use cosim::search::named::{Kind, find};
+use cosim::ssp;
+use cosim::system::{Opened, System};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use sweep::runner;
 
 /// Runs experiments with FMUs of FMI 2.0 and 3.0, for co-simulation or model exchange.
 ///
@@ -45,6 +50,81 @@ pub(crate) fn parse() -> Arguments {
         .unwrap_or_else(|error| error.format(&mut definition).exit())
 }
 
+/// Experiment with the changes that the command line makes to it.
+#[derive(Args, Default)]
+pub(crate) struct Subject {
+    /// Experiment: a file, an SSP archive, or the name of an experiment that `list` shows.
+    pub(crate) experiment: PathBuf,
+    /// Also look for FMUs in this folder, besides those of the experiment and the program. The
+    /// option may be given several times.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) fmu_dir: Vec<PathBuf>,
+    // The heading of these would apply to all arguments that follow.
+    #[command(flatten)]
+    pub(crate) overrides: Overrides,
+}
+
+impl Subject {
+    /// Finds the file of the experiment.
+    ///
+    /// # Errors
+    /// Returns an error if there is none.
+    pub(crate) fn path(&self) -> Result<PathBuf, Failure> {
+        Ok(find(&self.experiment, Kind::Experiment)?)
+    }
+
+    /// Checks the experiment or the SSP archive in this file. The entries of an archive are needed
+    /// for the names of its FMUs in errors.
+    ///
+    /// # Errors
+    /// Returns an error if anything is wrong with the experiment or the archive.
+    pub(crate) fn system(&self, path: &Path) -> Result<(System, Option<ssp::Entries>), Failure> {
+        if path.extension().is_some_and(|extension| extension == "ssp") {
+            let ssp::Loaded { experiment, mut opened, entries } = ssp::load(path, &self.overrides)?;
+            let system = check(experiment, &self.fmu_dir, &mut opened);
+            return Ok((system.map_err(|error| entries.named(error))?, Some(entries)));
+        }
+        let mut experiment = Experiment::load(path)?;
+        experiment.apply(&self.overrides)?;
+        Ok((check(experiment, &self.fmu_dir, &mut Opened::default())?, None))
+    }
+}
+
+/// Options of a command that flies many cases.
+#[derive(Args)]
+pub(crate) struct Many {
+    /// Folder for the results [default: one below out, with the name of the study or campaign].
+    #[arg(long, value_name = "DIR", help_heading = "Results")]
+    pub(crate) out: Option<PathBuf>,
+    /// Fly everything again, including what is finished.
+    #[arg(long, visible_alias = "force", help_heading = "Results")]
+    fresh: bool,
+    /// Also look for FMUs in this folder, besides those of the experiments and the program. The
+    /// option may be given several times.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) fmu_dir: Vec<PathBuf>,
+    /// Number of threads [default: one for each core].
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    jobs: usize,
+    /// Show neither progress nor summary.
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+impl Many {
+    /// Returns the options of the cases, which may take `time` (s) together.
+    pub(crate) fn options(&self, time: Option<u64>, interrupt: &Interrupt) -> runner::Options {
+        runner::Options {
+            out: self.out.clone(),
+            jobs: self.jobs,
+            fresh: self.fresh,
+            time: time.map(Duration::from_secs),
+            quiet: self.quiet,
+            interrupt: interrupt.clone(),
+        }
+    }
+}
+
 /// Commands of the program.
 #[derive(Subcommand)]
 pub(crate) enum Command {
@@ -52,33 +132,7 @@ pub(crate) enum Command {
     ///
     /// With --real-time the run keeps in step with the wall clock; the summary and metrics.json show
     /// how well it did. Ctrl-C, SIGTERM and SIGHUP end a run and keep its results.
-    Run {
-        /// Experiment to run: a file, an SSP archive, or the name of an experiment that `list`
-        /// shows.
-        experiment: PathBuf,
-        /// Folder for the results [default: out/EXPERIMENT].
-        #[arg(long, value_name = "DIR", help_heading = "Results")]
-        out: Option<PathBuf>,
-        /// Also look for FMUs in this folder, besides those of the experiment and the program.
-        /// The option may be given several times.
-        #[arg(long, value_name = "DIR")]
-        fmu_dir: Vec<PathBuf>,
-        #[command(flatten)]
-        overrides: Overrides,
-        /// Show neither progress nor summary.
-        #[arg(long, help_heading = "Display")]
-        quiet: bool,
-        /// Keep the run in step with the wall clock, FACTOR times as fast as real time. FACTOR is 1
-        /// if it is left out. A late run continues at once, and missed deadlines are counted.
-        #[arg(long, value_name = "FACTOR", num_args = 0..=1, default_missing_value = "1")]
-        real_time: Option<Factor>,
-        #[command(flatten)]
-        files: Files,
-        /// Replace the results of an earlier run in the folder. Without this option they are left
-        /// alone and nothing is run.
-        #[arg(long, help_heading = "Results")]
-        force: bool,
-    },
+    Run(run::Run),
     /// Draw recorded runs over one another, as a picture or as a page with the vehicle in motion.
     ///
     /// Each panel has curves of one unit, six at most. Units are those in which the FMUs and the
@@ -88,32 +142,7 @@ pub(crate) enum Command {
     /// each claim.
     ///
     /// Finished parts are kept. After an interruption the same command continues where it stopped.
-    Reproduce {
-        /// Study to run: the name of one that `list` shows, a folder with a study.toml, or such a
-        /// file.
-        study: PathBuf,
-        /// Folder for the results [default: out/STUDY].
-        #[arg(long, value_name = "DIR", help_heading = "Results")]
-        out: Option<PathBuf>,
-        /// Also look for FMUs in this folder, besides those of the study and the program. The
-        /// option may be given several times.
-        #[arg(long, value_name = "DIR")]
-        fmu_dir: Vec<PathBuf>,
-        /// Number of threads [default: one for each core].
-        #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
-        jobs: usize,
-        /// Run at most N cases of each run, for a quick look.
-        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
-        members: Option<u64>,
-        /// Run everything again, including what is finished.
-        #[arg(long, visible_alias = "force", help_heading = "Results")]
-        fresh: bool,
-        /// Show neither progress nor summary.
-        #[arg(long)]
-        quiet: bool,
-        #[command(flatten)]
-        process: Process,
-    },
+    Reproduce(reproduce::Reproduce),
     /// Fly thousands of cases of an experiment in which parameters vary, and write cases.parquet,
     /// summary.json and report.html: how often limits are broken, with what confidence, and the
     /// worst cases. With --worst look for the worst case.
@@ -141,38 +170,9 @@ pub(crate) enum Command {
     },
     /// Write an experiment as an SSP archive (System Structure and Parameterization 1.0), FMUs
     /// included.
-    Pack {
-        /// Experiment to pack: a file, or the name of an experiment that `list` shows.
-        experiment: PathBuf,
-        /// Path of the archive [default: EXPERIMENT.ssp].
-        #[arg(long, value_name = "FILE", help_heading = "Results")]
-        out: Option<PathBuf>,
-        /// Also look for FMUs in this folder, besides those of the experiment and the program.
-        /// The option may be given several times.
-        #[arg(long, value_name = "DIR")]
-        fmu_dir: Vec<PathBuf>,
-        #[command(flatten)]
-        overrides: Overrides,
-        /// Replace the archive if it exists.
-        #[arg(long, help_heading = "Results")]
-        force: bool,
-    },
+    Pack(pack::Pack),
     /// Show the variables and capabilities of an FMU.
-    Inspect {
-        /// FMU to show: a file, or the name of one that `list` shows.
-        fmu: PathBuf,
-        #[command(flatten)]
-        filter: Filter,
-        /// Print JSON, for other programs.
-        #[arg(long)]
-        json: bool,
-        /// Report the faults of the FMU and of its library instead, or that it is sound. The exit
-        /// code is 1 if there are any faults.
-        #[arg(long, conflicts_with_all = ["json", "pattern", "causality"])]
-        check: bool,
-        #[command(flatten)]
-        process: Process,
-    },
+    Inspect(inspect::Inspect),
     /// Print an experiment, a study or a campaign with all that it extends, and with lists
     /// expanded.
     Show {
@@ -215,20 +215,21 @@ impl Command {
     pub(crate) fn takes_long(&self) -> bool {
         matches!(
             self,
-            Self::Run { .. }
-                | Self::Reproduce { .. }
+            Self::Run(_)
+                | Self::Reproduce(_)
                 | Self::Campaign(_)
                 | Self::Margins(_)
-                | Self::Pack { .. }
+                | Self::Pack(_)
         )
     }
 
     /// Returns the law in another program that gives the moment.
     pub(crate) fn law(&self) -> Option<&str> {
         let overrides = match self {
-            Self::Run { overrides, .. } | Self::Pack { overrides, .. } => overrides,
+            Self::Run(asked) => &asked.subject.overrides,
+            Self::Pack(asked) => &asked.subject.overrides,
+            Self::Margins(asked) => &asked.subject.overrides,
             Self::Campaign(asked) => &asked.overrides,
-            Self::Margins(asked) => &asked.overrides,
             _ => return None,
         };
         overrides.law.as_deref()
@@ -238,7 +239,8 @@ impl Command {
     pub(crate) fn answers_in_json(&self) -> bool {
         match self {
             Self::Margins(asked) => asked.json,
-            Self::Inspect { json, .. } | Self::List { json, .. } => *json,
+            Self::Inspect(asked) => asked.json,
+            Self::List { json, .. } => *json,
             _ => false,
         }
     }

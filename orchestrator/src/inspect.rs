@@ -1,11 +1,14 @@
 //! Prints the description of an FMU, and checks it.
 
-use crate::catalogue::{self, Filter};
+use crate::catalogue;
 use crate::failure::Failure;
+use clap::Args;
 use cosim::error::Error;
 use cosim::experiment::Process;
+use cosim::search::named::{Kind, find};
 use fmi_master::description::{Interface, ModelDescription, ScalarType, Variable, VariableKind};
 use fmi_master::instance::CallFailure;
+use fmi_master::names;
 use fmi_master::quantity::UnitDefinition;
 use fmu_import::description::CAUSALITIES;
 use fmu_import::fmu::Fmu;
@@ -16,24 +19,65 @@ use std::path::{Path, PathBuf};
 use terminal_size::Width;
 use textwrap::Options;
 
-/// Prints the interfaces and platforms of an archive, and those of its variables that fit the
-/// filter.
+/// Options of `inspect`.
+#[derive(Args)]
+pub(crate) struct Inspect {
+    /// FMU to show: a file, or the name of one that `list` shows.
+    fmu: PathBuf,
+    /// Show only these variables: a name, a pattern with *, or a part of a name. Without it all
+    /// variables are shown.
+    pattern: Option<String>,
+    /// Print JSON, for other programs.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Report the faults of the FMU and of its library instead, or that it is sound. The exit
+    /// code is 1 if there are any faults.
+    #[arg(long, conflicts_with_all = ["json", "pattern"])]
+    check: bool,
+    #[command(flatten)]
+    process: Process,
+}
+
+/// Prints the interfaces and platforms of an archive and its variables, or checks it.
 ///
 /// # Errors
-/// Returns an error if the archive is no FMU, if no variable fits the filter, or if the text cannot
-/// be written.
-pub(crate) fn inspect(
-    path: &Path,
-    filter: &Filter,
-    as_json: bool,
-    out: &mut impl Write,
-) -> Result<(), Failure> {
-    let mut fmu = Fmu::open(path)?;
-    filter.apply(&mut fmu.description)?;
-    if as_json {
-        catalogue::print(&fmu, out)?;
+/// Returns an error if the archive is no FMU, if no variable fits the pattern, if a check finds
+/// faults, or if the text cannot be written.
+pub(crate) fn run(asked: &Inspect, out: &mut impl Write) -> Result<(), Failure> {
+    let path = find(&asked.fmu, Kind::Fmu)?;
+    if asked.check {
+        return check(&path, asked.process, out);
+    }
+    if asked.process != Process::default() {
+        let problem = "--isolate goes with --check, as nothing else runs the FMU";
+        return Err(Error::experiment(problem).into());
+    }
+    let mut fmu = Fmu::open(&path)?;
+    if let Some(pattern) = &asked.pattern {
+        choose(&mut fmu.description, pattern)?;
+    }
+    if asked.json {
+        catalogue::print(&fmu, out)?
     } else {
-        print(&fmu, out)?;
+        print(&fmu, out)?
+    }
+    Ok(())
+}
+
+/// Removes the variables that do not fit a pattern.
+fn choose(description: &mut ModelDescription, pattern: &str) -> Result<(), Error> {
+    let part = pattern.to_lowercase();
+    let fits = |variable: &Variable| {
+        names::matches(pattern, &variable.name) || variable.name.to_lowercase().contains(&part)
+    };
+    let variables = std::mem::take(&mut description.variables);
+    let (fitting, others): (Vec<_>, Vec<_>) = variables.into_iter().partition(fits);
+    description.variables = fitting;
+    if description.variables.is_empty() {
+        let hint = names::hint(pattern, others.iter().map(|other| &*other.name));
+        let model = &description.model_name;
+        let problem = format!("{model} has no variable that fits \"{pattern}\"{hint}");
+        return Err(Error::experiment(problem));
     }
     Ok(())
 }
@@ -44,7 +88,7 @@ pub(crate) fn inspect(
 /// # Errors
 /// Returns an error if there are faults, if the archive is no FMU at all, or if the
 /// text cannot be written.
-pub(crate) fn check(path: &Path, process: Process, out: &mut impl Write) -> Result<(), Failure> {
+fn check(path: &Path, process: Process, out: &mut impl Write) -> Result<(), Failure> {
     let fmu = Fmu::open(path)?;
     let is_closed = process.isolate.unwrap_or_else(isolation::can_close);
     let faults = if is_closed { faults(&fmu)? } else { fmu.faults() };

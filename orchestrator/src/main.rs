@@ -15,28 +15,22 @@ mod pack;
 mod picture;
 mod plain;
 mod plot;
+mod reproduce;
 mod run;
 mod schema;
 mod show;
 mod summary;
 
 use command_line::{Command, definition};
-use cosim::error::Error;
-use cosim::experiment::{Overrides, Process};
 use cosim::interrupt::Interrupt;
-use cosim::search::named::{Kind, find};
 use failure::Failure;
 use fmu_import::crash;
 use fmu_import::isolation::Messages;
 use fmu_import::law::{self, Printed};
 use plain::{Plain, plain};
-use run::Options;
 use serde_json::json;
 use std::io::{BufWriter, IsTerminal, Write, stderr, stdout};
 use std::process::ExitCode;
-use study::definition::Study;
-use study::reproduce;
-use sweep::runner;
 use tracing_subscriber::EnvFilter;
 
 fn main() -> ExitCode {
@@ -45,7 +39,7 @@ fn main() -> ExitCode {
     // A study may have a thousand runs, and its report counts their warnings. The results table of
     // a campaign holds the messages of instances.
     let usual = match arguments.command {
-        Command::Reproduce { .. } => "error",
+        Command::Reproduce(_) => "error",
         Command::Campaign(_) => "warn,fmu_import=off",
         _ => "warn",
     };
@@ -102,69 +96,16 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         interrupt.listen()?;
     }
     match command {
-        Command::Run {
-            experiment,
-            out: folder,
-            fmu_dir,
-            overrides,
-            quiet,
-            real_time,
-            files,
-            force,
-        } => {
-            let options = Options {
-                out: folder,
-                quiet,
-                real_time,
-                files,
-                force,
-                interrupt: interrupt.clone(),
-            };
-            let experiment = find(&experiment, Kind::Experiment)?;
-            run::run(&experiment, &overrides, &fmu_dir, &options, out)
-        }
-        Command::Reproduce {
-            study,
-            out: folder,
-            fmu_dir,
-            jobs,
-            members,
-            fresh,
-            quiet,
-            process,
-        } => {
-            let study = Study::load_with(&find(&study, Kind::Study)?, members)?;
-            let overrides = Overrides { process, ..Default::default() };
-            let interrupt = interrupt.clone();
-            let options =
-                runner::Options { out: folder, jobs, fresh, quiet, interrupt, time: None };
-            let report = reproduce::reproduce(&study, &fmu_dir, &overrides, &options)?;
-            if !quiet {
-                summary::reproduction(&report, out)?;
-            }
-            Ok(())
-        }
+        Command::Run(asked) => run::run(&asked, out, interrupt),
+        Command::Reproduce(asked) => reproduce::reproduce(asked, out, interrupt),
         Command::Plot(asked) => plot::plot(&asked, out),
         Command::Campaign(asked) => campaign::fly(&asked, out, interrupt),
         Command::Margins(asked) => margins::print(&asked, out, interrupt),
         Command::Judge { experiment, out: folder, fmu_dir } => {
             judge::judge(&experiment, &fmu_dir, &folder)
         }
-        Command::Pack { experiment, out: archive, fmu_dir, overrides, force } => {
-            let archive = pack::Archive { path: archive, force };
-            pack::pack(&experiment, &overrides, &fmu_dir, archive, out, interrupt)
-        }
-        Command::Inspect { fmu, filter, json, check, process } => {
-            let fmu = find(&fmu, Kind::Fmu)?;
-            if check {
-                inspect::check(&fmu, process, out)
-            } else if process != Process::default() {
-                let problem = "--isolate goes with --check, as nothing else runs the FMU";
-                Err(Error::experiment(problem).into())
-            } else {
-                inspect::inspect(&fmu, &filter, json, out)
-            }
-        }
+        Command::Pack(asked) => pack::pack(&asked, out, interrupt),
+        Command::Inspect(asked) => inspect::run(&asked, out),
         Command::Show { name } => show::show(&name, out),
         Command::Schema { kind } => Ok(out.write_all(schema::text(kind).as_bytes())?),
         Command::Completions { shell } => {

@@ -1,13 +1,11 @@
 //! The command `margins`.
 
+use crate::command_line::Subject;
 use crate::failure::Failure;
 use crate::picture;
-use crate::run;
 use clap::Args;
 use cosim::error::Error;
-use cosim::experiment::Overrides;
 use cosim::interrupt::Interrupt;
-use cosim::search::named::{Kind, find};
 use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
 use fmi_master::quantity::rounded;
 use linear::Matrix;
@@ -23,8 +21,6 @@ use std::path::PathBuf;
 /// Arguments of `margins`.
 #[derive(Args)]
 pub(crate) struct PrintMargins {
-    /// Experiment: a file, an SSP archive, or the name of an experiment that `list` shows.
-    experiment: PathBuf,
     /// Time of the run at which it is linearised, s [default: that of the experiment's
     /// [observe.margins]].
     #[arg(long, value_name = "SECONDS", help_heading = "Linearisation")]
@@ -42,18 +38,13 @@ pub(crate) struct PrintMargins {
     /// File for a Nichols plot of the return ratio and a plot of the sensitivity (.svg).
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
-    /// Also look for FMUs in this folder, besides those of the experiment and the program. The
-    /// option may be given several times.
-    #[arg(long, value_name = "DIR")]
-    fmu_dir: Vec<PathBuf>,
     #[command(flatten)]
-    pub(crate) overrides: Overrides,
+    pub(crate) subject: Subject,
 }
 
 impl PrintMargins {
     fn linearise(&self, interrupt: &Interrupt) -> Result<Linearised, Failure> {
-        let path = find(&self.experiment, Kind::Experiment)?;
-        let (system, _) = run::system(&path, &self.overrides, &self.fmu_dir)?;
+        let (system, _) = self.subject.system(&self.subject.path()?)?;
         let asked = system.experiment.observe.margins.clone();
         let missing = |option: &str| {
             let problem = format!(

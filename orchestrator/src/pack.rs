@@ -1,22 +1,26 @@
 //! The command `pack`, which writes an experiment as an SSP archive.
 
+use crate::command_line::Subject;
 use crate::failure::Failure;
-use crate::run::system;
+use clap::Args;
 use cosim::error::Error;
-use cosim::experiment::Overrides;
 use cosim::interrupt::Interrupt;
-use cosim::search::named::{Kind, find};
 use cosim::ssp;
 use cosim::system::System;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// An SSP archive that is to be written.
-pub(crate) struct Archive {
-    /// Path of the archive; that of the experiment if it is not given.
-    pub(crate) path: Option<PathBuf>,
-    /// Whether an existing archive may be replaced.
-    pub(crate) force: bool,
+/// Options of `pack`.
+#[derive(Args)]
+pub(crate) struct Pack {
+    /// Path of the archive [default: EXPERIMENT.ssp].
+    #[arg(long, value_name = "FILE", help_heading = "Results")]
+    out: Option<PathBuf>,
+    /// Replace the archive if it exists.
+    #[arg(long, help_heading = "Results")]
+    force: bool,
+    #[command(flatten)]
+    pub(crate) subject: Subject,
 }
 
 /// Writes an experiment as an SSP archive.
@@ -24,29 +28,25 @@ pub(crate) struct Archive {
 /// # Errors
 /// Returns an error if the experiment is faulty, or if the archive exists or cannot be written.
 pub(crate) fn pack(
-    experiment: &Path,
-    overrides: &Overrides,
-    fmu_dirs: &[PathBuf],
-    archive: Archive,
+    asked: &Pack,
     out: &mut impl Write,
     interrupt: &Interrupt,
 ) -> Result<(), Failure> {
-    if overrides.law.is_some() {
+    if asked.subject.overrides.law.is_some() {
         return Err(Error::experiment("an archive cannot hold a law in another program").into());
     }
-    let path = find(experiment, Kind::Experiment)?;
-    let Archive { path: archive, force } = archive;
-    let archive = archive.unwrap_or_else(|| {
+    let path = asked.subject.path()?;
+    let archive = asked.out.clone().unwrap_or_else(|| {
         PathBuf::from(path.file_stem().unwrap_or_default()).with_extension("ssp")
     });
-    if archive.exists() && !force {
+    if archive.exists() && !asked.force {
         let path = archive.display();
         return Err(Error::experiment(format!(
             "{path} already exists: --force replaces it, --out chooses another name"
         ))
         .into());
     }
-    let (system, _entries) = system(&path, overrides, fmu_dirs)?;
+    let (system, _entries) = asked.subject.system(&path)?;
     ssp::pack(&system, &archive, interrupt)?;
     let lost = ssp::lost(&system).join(", ");
     if !lost.is_empty() {

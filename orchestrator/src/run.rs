@@ -1,20 +1,19 @@
 //! Runs an experiment and writes its results. Observers of the system record, measure and
 //! draw it.
 
+use crate::command_line::Subject;
 use crate::failure::Failure;
 use crate::flight::{self, Flown, Heard};
 use crate::summary::{self, RunReport};
-use cosim::check::check;
+use clap::Args;
 use cosim::error::Error;
-use cosim::experiment::{Experiment, Overrides};
 use cosim::files;
 use cosim::interrupt::Interrupt;
 use cosim::metadata;
 use cosim::pacing::{Factor, RealTime};
 use cosim::recorder::{FILE, Recorder};
 use cosim::run::{Observer, Sample};
-use cosim::ssp;
-use cosim::system::{Opened, Parameters, System};
+use cosim::system::{Parameters, System};
 use cosim_metrics::folder::Folder;
 use cosim_metrics::metrics::{Meters, Metrics};
 use cosim_metrics::progress::Progress;
@@ -26,50 +25,32 @@ use linear::measures::Measured;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Choice of the pictures that a run draws.
-#[derive(Clone, Copy, Debug, Default, clap::Args)]
-#[command(next_help_heading = "Results")]
-struct Pictures {
+/// Options of `run`.
+#[derive(Args, Default)]
+pub(crate) struct Run {
+    /// Folder for the results [default: out/EXPERIMENT].
+    #[arg(long, value_name = "DIR", help_heading = "Results")]
+    pub(crate) out: Option<PathBuf>,
+    /// Replace the results of an earlier run in the folder. Without this option they are left
+    /// alone and nothing is run.
+    #[arg(long, help_heading = "Results")]
+    pub(crate) force: bool,
     /// Draw no plot.svg.
-    #[arg(long)]
-    no_plot: bool,
+    #[arg(long, help_heading = "Results")]
+    pub(crate) no_plot: bool,
     /// Also write page.html, which works without a network: curves with a common cursor, the
     /// vehicle in motion, summary and parameters.
+    #[arg(long, help_heading = "Results")]
+    pub(crate) page: bool,
+    /// Show neither progress nor summary.
     #[arg(long)]
-    page: bool,
-}
-
-/// Choice of the files that a run writes.
-#[derive(Clone, Copy, Debug, Default, clap::Args)]
-#[command(next_help_heading = "Results")]
-pub(crate) struct Files {
-    /// Write no results.csv.
-    #[arg(long)]
-    no_csv: bool,
-    #[command(flatten)]
-    pictures: Pictures,
-    /// Write the header of results.csv as name [unit], and items of enumerations by their names.
-    /// Without this option the header holds the names alone and every cell is a number, as FMPy and
-    /// NumPy expect; results.json holds the units and items.
-    #[arg(long, conflicts_with = "no_csv")]
-    labels: bool,
-}
-
-/// Options of a run: where its results go, how it is paced, and what is shown.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Options {
-    /// Folder for the results; `out/<experiment>` if it is not given.
-    pub(crate) out: Option<PathBuf>,
-    /// Whether the progress display is suppressed.
     pub(crate) quiet: bool,
-    /// Factor of a run that is paced by the wall clock; `None` runs as fast as possible.
+    /// Keep the run in step with the wall clock, FACTOR times as fast as real time. FACTOR is 1
+    /// if it is left out. A late run continues at once, and missed deadlines are counted.
+    #[arg(long, value_name = "FACTOR", num_args = 0..=1, default_missing_value = "1")]
     pub(crate) real_time: Option<Factor>,
-    /// Choice of the files that the run writes.
-    pub(crate) files: Files,
-    /// Whether the results of an earlier run may be replaced.
-    pub(crate) force: bool,
-    /// Interrupt through which the run can be ended from outside.
-    pub(crate) interrupt: Interrupt,
+    #[command(flatten)]
+    pub(crate) subject: Subject,
 }
 
 /// Runs an experiment, or the system of an SSP archive, and prints the summary.
@@ -78,14 +59,13 @@ pub(crate) struct Options {
 /// Returns an error if the experiment is faulty, if an instance fails, or if a file cannot be
 /// written.
 pub(crate) fn run(
-    path: &Path,
-    overrides: &Overrides,
-    fmu_dirs: &[PathBuf],
-    options: &Options,
+    options: &Run,
     out: &mut impl Write,
+    interrupt: &Interrupt,
 ) -> Result<(), Failure> {
-    let (mut system, entries) = system(path, overrides, fmu_dirs)?;
-    let report = record(&mut system, options).map_err(|error| match (error, &entries) {
+    let (mut system, entries) = options.subject.system(&options.subject.path()?)?;
+    let report = record(&mut system, options, interrupt);
+    let report = report.map_err(|error| match (error, &entries) {
         (Failure::Single(error), Some(entries)) => entries.named(error).into(),
         (error, _) => error,
     })?;
@@ -98,26 +78,6 @@ pub(crate) fn run(
     report.late.map_or(Ok(()), |error| Err(error.into()))
 }
 
-/// Checks an experiment or the system of an SSP archive. The entries of an archive are needed for
-/// the names of its FMUs in errors.
-///
-/// # Errors
-/// Returns an error if anything is wrong with the experiment or the archive.
-pub(crate) fn system(
-    path: &Path,
-    overrides: &Overrides,
-    fmu_dirs: &[PathBuf],
-) -> Result<(System, Option<ssp::Entries>), Failure> {
-    if path.extension().is_some_and(|extension| extension == "ssp") {
-        let ssp::Loaded { experiment, mut opened, entries } = ssp::load(path, overrides)?;
-        let system = check(experiment, fmu_dirs, &mut opened);
-        return Ok((system.map_err(|error| entries.named(error))?, Some(entries)));
-    }
-    let mut experiment = Experiment::load(path)?;
-    experiment.apply(overrides)?;
-    Ok((check(experiment, fmu_dirs, &mut Opened::default())?, None))
-}
-
 /// Returns why a run ended early, if its results are those of a run.
 ///
 /// # Errors
@@ -126,9 +86,8 @@ fn early(outcome: Result<(), Error>, out: &Path) -> Result<Option<Error>, Error>
     match outcome {
         Ok(()) => Ok(None),
         Err(
-            error @ (Error::Interrupted { .. }
-            | Error::EndedByInstance { .. }
-            | Error::Lost { .. }),
+            error
+            @ (Error::Interrupted { .. } | Error::EndedByInstance { .. } | Error::Lost { .. }),
         ) => Ok(Some(error)),
         Err(error) => {
             tracing::warn!("the results up to this failure are in {}", out.display());
@@ -157,9 +116,9 @@ fn ended(reason: Option<Error>, quiet: bool) -> Result<(), Failure> {
 ///
 /// # Errors
 /// Returns an error if an FMU fails, or if a file cannot be written.
-fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> {
-    let mut outputs = Outputs::new(system, options)?;
-    let flown = flight::fly(outputs.system, options.real_time, &options.interrupt, &mut outputs)?;
+fn record(system: &mut System, options: &Run, interrupt: &Interrupt) -> Result<RunReport, Failure> {
+    let mut outputs = Outputs::new(system, options, interrupt)?;
+    let flown = flight::fly(outputs.system, options.real_time, interrupt, &mut outputs)?;
     let Flown { outcome, wall, end, real_time, margins, late } = flown;
     let out = outputs.out.clone();
     let written = outputs.write(outcome.as_ref().err(), wall, real_time, margins);
@@ -172,7 +131,8 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
 /// What a run writes and shows. It observes the run.
 struct Outputs<'a> {
     system: &'a System,
-    options: &'a Options,
+    options: &'a Run,
+    interrupt: &'a Interrupt,
     parameters: Parameters,
     /// The folder of the results, which is taken as long as this value lives.
     folder: Option<Folder>,
@@ -191,12 +151,15 @@ impl<'a> Outputs<'a> {
     ///
     /// # Errors
     /// Returns an error if a signal is unknown, or if there are results that may not be replaced.
-    fn new(system: &'a mut System, options: &'a Options) -> Result<Self, Failure> {
+    fn new(
+        system: &'a mut System,
+        options: &'a Run,
+        interrupt: &'a Interrupt,
+    ) -> Result<Self, Failure> {
         let meters = Meters::new(system)?.ending_when_lost();
         // A panel of a wrong signal is refused before the run, whether it is drawn or not.
         Panel::resolve_all(system)?;
-        let Pictures { no_plot, page } = options.files.pictures;
-        let watch = (page || !no_plot).then(|| Watch::new(system)).transpose()?;
+        let watch = (options.page || !options.no_plot).then(|| Watch::new(system)).transpose()?;
         for doubt in system.doubts() {
             tracing::warn!("{doubt}");
         }
@@ -207,6 +170,7 @@ impl<'a> Outputs<'a> {
         Ok(Self {
             system,
             options,
+            interrupt,
             parameters: Parameters::new(),
             folder: None,
             out,
@@ -246,12 +210,11 @@ impl<'a> Outputs<'a> {
             metrics.real_time = Some(real_time);
         }
         files::write_json(&self.out.join("metrics.json"), &metrics)?;
-        let Pictures { no_plot, page } = self.options.files.pictures;
         let Some(watch) = self.watch else { return Ok((metrics, files)) };
-        if !no_plot && watch.draw(&self.out.join("plot.svg"), &system.experiment.title)? {
+        if !options.no_plot && watch.draw(&self.out.join("plot.svg"), &system.experiment.title)? {
             files.push("plot.svg");
         }
-        if page {
+        if options.page {
             let mut recording = watch.recording(&self.name, &metadata);
             recording.summary = summary::lines(&system.experiment.observe, &metrics);
             let recordings = [recording];
@@ -277,17 +240,16 @@ impl<'a> Outputs<'a> {
 impl Heard for Outputs<'_> {
     /// Takes the folder and begins the file of recorded variables.
     fn begin(&mut self, parameters: Parameters) -> Result<(), Error> {
-        let Options { force, quiet, real_time, files, interrupt, .. } = self.options;
+        let Run { force, quiet, real_time, .. } = self.options;
         let clock = self.system.clock;
-        if let Some(request) = interrupt.asked() {
+        if let Some(request) = self.interrupt.asked() {
             return Err(Error::Interrupted { time: clock.start(), request });
         }
         let folder = Folder::take(&self.out)?;
         // Another process may have written to the folder in the meantime.
         Folder::check(&self.out, *force)?;
         folder.clear()?;
-        let recorder = (!files.no_csv).then(|| self.system.recorder(&self.out, files.labels));
-        self.recorder = recorder.transpose()?;
+        self.recorder = Some(self.system.recorder(&self.out)?);
         let title = &self.system.experiment.title;
         self.progress = Some(Progress::new(title, clock.ticks(), *quiet, real_time.is_some()));
         (self.parameters, self.folder) = (parameters, Some(folder));

@@ -9,7 +9,6 @@ use cosim_report::recording::{SummaryLine, share_text};
 use fmi_master::quantity::rounded;
 use std::io::{self, Write};
 use std::path::PathBuf;
-use study::reproduce::StudyReport;
 
 /// Report on a run.
 #[derive(Debug)]
@@ -116,30 +115,6 @@ pub(crate) fn summary(system: &System, report: &RunReport, out: &mut impl Write)
 /// Returns the lines for the metrics of a run and for its guarantee.
 pub(crate) fn lines(observe: &Observe, metrics: &Metrics) -> Vec<SummaryLine> {
     metric_lines(observe, metrics).into_iter().chain(guarantee(metrics)).collect()
-}
-
-/// Prints the outcome of a reproduction.
-///
-/// # Errors
-/// Returns an error if the text cannot be written.
-pub(crate) fn reproduction(report: &StudyReport, out: &mut impl Write) -> io::Result<()> {
-    let (run, stored) = report.parts;
-    writeln!(out, "{}", report.title)?;
-    writeln!(
-        out,
-        "  {} runs in {} parts: {run} run now, {stored} kept from before; {:.1} s elapsed",
-        report.runs,
-        run + stored,
-        report.elapsed
-    )?;
-    for note in &report.notes {
-        writeln!(out, "  note: {note}")?;
-    }
-    for (claim, verdict) in &report.verdicts {
-        writeln!(out, "  {:<14} {claim}", verdict.text())?;
-    }
-    writeln!(out, "  report: {}", report.page.display())?;
-    writeln!(out, "  in the same folder: {}", report.files[1..].join("; "))
 }
 
 /// Formats the ratio of a value to its limit, and returns whether the limit is kept.

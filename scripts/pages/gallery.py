@@ -65,7 +65,7 @@ def program():
 
 def fly(picture, out):
     with tempfile.TemporaryDirectory() as folder:
-        command = [program(), "run", *picture.arguments, "--fmu-dir", TARGET / "fmu", "--out", f"{folder}/run", "--no-csv", "--quiet"]
+        command = [program(), "run", *picture.arguments, "--fmu-dir", TARGET / "fmu", "--out", f"{folder}/run", "--quiet"]
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
         plot = Path(folder, "run", "plot.svg")
         if done.returncode not in DONE or not plot.is_file():

@@ -35,7 +35,7 @@ def main(studies: Path) -> None:
         shutil.copyfile(studies / f"{figure}.svg", IMAGES / f"{name}.svg")
     with tempfile.TemporaryDirectory() as folder:
         for name, experiment in FLIGHTS.items():
-            call("run", experiment, "--no-csv", "--quiet", "--out", f"{folder}/{name}")
+            call("run", experiment, "--quiet", "--out", f"{folder}/{name}")
             shutil.copyfile(f"{folder}/{name}/plot.svg", IMAGES / f"{name}.svg")
 
 

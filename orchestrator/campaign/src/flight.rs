@@ -109,7 +109,7 @@ impl<'a> Flight<'a> {
     pub fn keep(mut self, case: u64, folder: &Path, title: &str) -> Result<(), Error> {
         let system = self.instances.system();
         let mut watch = Watch::new(system)?;
-        let mut recorder = system.recorder(folder, false)?;
+        let mut recorder = system.recorder(folder)?;
         let values = self.plan.sweep.values(case);
         let flown = self.fly_with(case, values, &mut [&mut recorder, &mut watch]);
         recorder.finish()?;

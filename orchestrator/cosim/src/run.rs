@@ -3,8 +3,8 @@
 
 use crate::error::Error;
 use crate::interrupt::Interrupt;
-use crate::pacing::{Factor, Pacer};
 use crate::pacing::timer::{Monotonic, Timer};
+use crate::pacing::{Factor, Pacer};
 use crate::stopwatch::{Spent, Stopwatch};
 use fmi_master::master::{Failed, Master, Member, Watcher};
 use fmu_import::warnings;

@@ -331,20 +331,17 @@ impl System {
     ///
     /// # Errors
     /// Returns an error if the file cannot be written.
-    pub fn recorder(&self, folder: &Path, labels: bool) -> Result<Recorder, Error> {
+    pub fn recorder(&self, folder: &Path) -> Result<Recorder, Error> {
         let places: HashMap<Port, usize> =
             self.probes.iter().enumerate().rev().map(|(place, port)| (*port, place)).collect();
         let column = |column: &Column| {
             let port = column.port;
-            let kind = &self.variable_at(port).kind;
-            let (unit, items) = (kind.unit().map(String::from), kind.items().to_vec());
             let (name, carrier) = (column.name.clone(), port.carrier);
-            let place = *places.get(&port)?;
-            Some(recorder::Column { name, place, carrier, unit, items })
+            Some(recorder::Column { name, place: *places.get(&port)?, carrier })
         };
         let columns: Vec<_> = self.columns.iter().filter_map(column).collect();
         let path = folder.join(recorder::FILE);
-        Recorder::create(&path, &columns, self.experiment.record.every, labels)
+        Recorder::create(&path, columns, self.experiment.record.every)
     }
 }
 

@@ -20,8 +20,6 @@ pub enum OnInvalid {
     Error,
     /// A warning is printed once for each variable.
     Warn,
-    /// The value is passed on without a check.
-    Allow,
 }
 
 /// An instance whose output values are watched.
@@ -36,17 +34,13 @@ pub(crate) struct Watched {
 }
 
 impl Watched {
-    /// Watches `instance`, which is called `name`. With [`OnInvalid::Allow`] the instance is
-    /// returned unchanged.
+    /// Watches `instance`, which is called `name`.
     pub(crate) fn around(
         instance: Box<dyn Instance>,
         name: &str,
         fmu: &Rc<Fmu>,
         on_invalid: OnInvalid,
     ) -> Box<dyn Instance> {
-        if on_invalid == OnInvalid::Allow {
-            return instance;
-        }
         let of_items = |variable: &Variable| {
             let items: Vec<i32> = variable.kind.items().iter().map(|(_, value)| *value).collect();
             matches!(variable.kind, VariableKind::Enumeration { .. })
@@ -68,30 +62,31 @@ impl Watched {
     }
 
     #[cold]
-    fn invalid(
-        &self,
-        call: &'static str,
-        carrier: Carrier,
-        reference: u32,
-        value: &str,
-        what: &str,
-    ) -> Outcome {
+    fn invalid(&self, call: &'static str, kind: Carrier, reference: u32, value: String) -> Outcome {
+        let what = match kind {
+            Carrier::Real => "not finite",
+            Carrier::Integer => "no item of its enumeration",
+            Carrier::Boolean => "neither true nor false",
+        };
         let is_meant = |variable: &&Variable| {
-            (Carrier::for_kind(&variable.kind), variable.reference) == (Some(carrier), reference)
+            (Carrier::for_kind(&variable.kind), variable.reference) == (Some(kind), reference)
         };
         let variable = self.fmu.description.variables.iter().find(is_meant).map_or_else(
             || format!("variable {reference}"),
             |variable| format!("\"{}\"", variable.name),
         );
         if !self.warns {
-            let remedy = "with --on-invalid warn the run continues";
-            return Err(CallFailure::answer(
-                call,
-                format!("{variable} is {value}, which is {what}; {remedy}"),
-            ));
+            let remedy = "with on_invalid = \"warn\" in [simulation] the run continues";
+            let message = format!("{variable} is {value}, which is {what}; {remedy}");
+            return Err(CallFailure::answer(call, message));
         }
         warnings::warn(&format!("{}: {variable} is {what}", self.name));
         Ok(())
+    }
+
+    fn is_item(&self, reference: u32, value: i32) -> bool {
+        let place = self.items.binary_search_by_key(&reference, |(reference, _)| *reference);
+        place.map_or(true, |place| self.items[place].1.contains(&value))
     }
 }
 
@@ -100,13 +95,7 @@ impl Instance for Watched {
         self.instance.get_real(references, values)?;
         for (value, &reference) in values.iter().zip(references) {
             if !value.is_finite() {
-                self.invalid(
-                    "getReal",
-                    Carrier::Real,
-                    reference,
-                    &value.to_string(),
-                    "not finite",
-                )?;
+                self.invalid("getReal", Carrier::Real, reference, value.to_string())?;
             }
         }
         Ok(())
@@ -114,14 +103,9 @@ impl Instance for Watched {
 
     fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
         self.instance.get_integer(references, values)?;
-        if self.items.is_empty() {
-            return Ok(());
-        }
-        for (value, &reference) in values.iter().zip(references) {
-            let place = self.items.binary_search_by_key(&reference, |(reference, _)| *reference);
-            if place.is_ok_and(|place| !self.items[place].1.contains(value)) {
-                let what = "no item of its enumeration";
-                self.invalid("getInteger", Carrier::Integer, reference, &value.to_string(), what)?;
+        for (&value, &reference) in values.iter().zip(references) {
+            if !self.is_item(reference, value) {
+                self.invalid("getInteger", Carrier::Integer, reference, value.to_string())?;
             }
         }
         Ok(())
@@ -131,8 +115,7 @@ impl Instance for Watched {
         self.instance.get_boolean(references, values)?;
         for (value, &reference) in values.iter().zip(references) {
             if !matches!(value, 0 | 1) {
-                let what = "neither true nor false";
-                self.invalid("getBoolean", Carrier::Boolean, reference, &value.to_string(), what)?;
+                self.invalid("getBoolean", Carrier::Boolean, reference, value.to_string())?;
             }
         }
         Ok(())

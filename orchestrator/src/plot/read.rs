@@ -6,13 +6,13 @@ use cosim::experiment::{MeasureKind, Observe};
 use cosim::recorder::FILE;
 use cosim_metrics::metrics::Metrics;
 use cosim_report::recording::{Recording, Track, display_unit};
-use serde_json::{Map, Value};
+use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Columns of numbers with their names, and the units that the file itself gives, by name.
-type Columns = (Vec<(String, Vec<f64>)>, BTreeMap<String, String>);
+/// Columns of numbers with their names.
+type Columns = Vec<(String, Vec<f64>)>;
 
 /// Reads a run: a folder of results, or a file of recorded variables.
 ///
@@ -29,7 +29,7 @@ pub(super) fn recording(path: &Path) -> Result<Recording, Error> {
         );
         return Err(Error::experiment(problem));
     }
-    let (columns, units) = text(&file, &metadata)?;
+    let columns = text(&file)?;
     check_names(&columns, &file)?;
     let mut columns = columns.into_iter();
     let first = columns.next().filter(|(name, _)| name.eq_ignore_ascii_case("time"));
@@ -41,7 +41,7 @@ pub(super) fn recording(path: &Path) -> Result<Recording, Error> {
     let described = metadata["columns"].as_array().cloned().unwrap_or_default();
     let tracks = columns.map(|(name, values)| {
         let column = described.iter().find(|column| column["name"] == name.as_str());
-        (name.clone(), track(column.unwrap_or(&Value::Null), units.get(&name), values))
+        (name.clone(), track(column.unwrap_or(&Value::Null), values))
     });
     let name = match file.file_name().and_then(|name| name.to_str()) {
         Some(FILE) => fs::canonicalize(folder).ok(),
@@ -119,8 +119,8 @@ fn json_of(path: &Path) -> Result<Value, Error> {
 }
 
 /// Makes a track of a column, which `results.json` describes.
-fn track(column: &Value, unit: Option<&String>, values: Vec<f64>) -> Track {
-    let unit = column["unit"].as_str().or(unit.map(String::as_str)).unwrap_or_default();
+fn track(column: &Value, values: Vec<f64>) -> Track {
+    let unit = column["unit"].as_str().unwrap_or_default();
     let (unit, factor) = if column["display_unit"].is_null() {
         usual_unit(unit)
     } else {
@@ -142,8 +142,8 @@ fn usual_unit(unit: &str) -> (String, f64) {
     }
 }
 
-/// Reads a CSV file, also one whose header has units and whose cells have names of items.
-fn text(path: &Path, metadata: &Value) -> Result<Columns, Error> {
+/// Reads a CSV file.
+fn text(path: &Path) -> Result<Columns, Error> {
     let failed = |error: csv::Error| {
         if error.is_io_error() {
             Error::file(path)(error.into())
@@ -152,30 +152,14 @@ fn text(path: &Path, metadata: &Value) -> Result<Columns, Error> {
         }
     };
     let mut reader = csv::Reader::from_path(path).map_err(failed)?;
-    let mut units = BTreeMap::new();
-    let mut columns: Vec<(String, Vec<f64>)> = Vec::new();
-    for head in reader.headers().map_err(failed)? {
-        let labelled = head.strip_suffix(']').and_then(|head| head.rsplit_once(" ["));
-        let name = labelled.map_or(head, |(name, _)| name);
-        units.extend(labelled.map(|(name, unit)| (name.to_string(), unit.to_string())));
-        columns.push((name.into(), Vec::new()));
-    }
-    let items: Vec<Map<String, Value>> = columns
-        .iter()
-        .map(|(name, _)| {
-            let described = metadata["columns"].as_array().into_iter().flatten();
-            let column = described.into_iter().find(|column| column["name"] == name.as_str());
-            column.and_then(|column| column["items"].as_object()).cloned().unwrap_or_default()
-        })
-        .collect();
+    let heads = reader.headers().map_err(failed)?;
+    let mut columns: Columns = heads.iter().map(|name| (name.into(), Vec::new())).collect();
     for (row, record) in reader.records().enumerate() {
         let record = record.map_err(failed)?;
-        for ((cell, (name, values)), items) in record.iter().zip(&mut columns).zip(&items) {
-            let item = || items.iter().find(|(_, item)| *item == cell)?.0.parse().ok();
+        for (cell, (name, values)) in record.iter().zip(&mut columns) {
             // A blank cell is a missing value, at which a curve has a gap.
-            let blank = cell.trim().is_empty().then_some(f64::NAN);
-            let number = blank.or_else(|| cell.trim().parse().ok()).or_else(item);
-            values.push(number.ok_or_else(|| {
+            let number = if cell.trim().is_empty() { "NaN" } else { cell.trim() }.parse();
+            values.push(number.map_err(|_| {
                 Error::experiment(format!(
                     "{}, row {}, {name}: \"{cell}\" is not a number",
                     path.display(),
@@ -184,7 +168,7 @@ fn text(path: &Path, metadata: &Value) -> Result<Columns, Error> {
             })?);
         }
     }
-    Ok((columns, units))
+    Ok(columns)
 }
 
 /// Returns the units of those metrics whose signals are recorded.
@@ -209,51 +193,34 @@ fn metric_units(run: &Recording) -> BTreeMap<String, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
 
-    fn read(name: &str, content: &str, metadata: Option<&Value>) -> Result<Recording, Error> {
+    fn read(name: &str, content: &str) -> Result<Recording, Error> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(name);
         fs::write(&path, content).unwrap();
-        if let Some(metadata) = metadata {
-            fs::write(folder.path().join("results.json"), metadata.to_string()).unwrap();
-        }
         recording(&path)
     }
 
     #[test]
-    fn a_file_alone_has_its_own_units() {
-        let run = read("mine.csv", "time [s],a.x [rad/s],a.y\n0,1,2\n1,3,4\n", None).unwrap();
-        assert_eq!((run.name.as_str(), run.time.as_slice()), ("mine", &[0.0, 1.0][..]));
-        let track = run.track("a.x").unwrap();
-        assert_eq!((track.unit.as_str(), track.values.as_slice()), ("deg/s", &[1.0, 3.0][..]));
-        assert_eq!(run.track("a.y").unwrap().unit, "");
-    }
-
-    #[test]
-    fn names_of_items_are_read_as_their_numbers() {
-        let items = json!({ "columns": [{ "name": "a.mode", "items": { "3": "fast" } }] });
-        let table = "time,a.mode\n0,fast\n1,3\n";
-        let run = read("results.csv", table, Some(&items)).unwrap();
-        assert_eq!(run.track("a.mode").unwrap().values, [3.0, 3.0]);
-        let fault = read("results.csv", "time,a.mode\n0,slow\n", Some(&items)).unwrap_err();
+    fn a_cell_that_is_no_number_is_refused() {
+        let fault = read("results.csv", "time,a.mode\n0,slow\n").unwrap_err();
         assert!(fault.to_string().contains("row 2, a.mode: \"slow\" is not a number"), "{fault}");
     }
 
     #[test]
     fn a_blank_cell_is_a_gap_but_no_time() {
-        let run = read("mine.csv", "time,a,b\n0,1,2\n1,,NaN\n2, ,4\n3,5,nan\n", None).unwrap();
+        let run = read("mine.csv", "time,a,b\n0,1,2\n1,,NaN\n2, ,4\n3,5,nan\n").unwrap();
         let gaps =
             |name: &str| run.track(name).unwrap().values.iter().map(|v| v.is_nan()).collect();
         let (a, b): (Vec<bool>, Vec<bool>) = (gaps("a"), gaps("b"));
         assert_eq!((a, b), (vec![false, true, true, false], vec![false, true, false, true]));
-        let fault = read("a.csv", "time,a\n0,1\n,2\n", None).unwrap_err().to_string();
+        let fault = read("a.csv", "time,a\n0,1\n,2\n").unwrap_err().to_string();
         assert!(fault.ends_with("a.csv, row 3, time: NaN is no time"), "{fault}");
     }
 
     #[test]
     fn a_column_may_be_called_as_another_program_likes() {
-        let run = read("mine.csv", "time,b\n0,1\n1,3\n1,4\n", None).unwrap();
+        let run = read("mine.csv", "time,b\n0,1\n1,3\n1,4\n").unwrap();
         assert_eq!(run.track("b").unwrap().values, [1.0, 3.0, 4.0]);
         let panels = cosim_report::recording::asked::of_experiments(&[run]).unwrap();
         assert_eq!((panels.len(), panels[0].label.as_str()), (1, "b"));
@@ -261,25 +228,25 @@ mod tests {
 
     #[test]
     fn what_is_no_curve_over_time_is_refused_by_row_and_column() {
-        let fault = |table: &str| read("a.csv", table, None).unwrap_err().to_string();
+        let fault = |table: &str| read("a.csv", table).unwrap_err().to_string();
         let backwards = fault("time,a.x\n0,1\n2,3\n1,2\n");
         let said = "a.csv, row 4, time: 1 s comes after 2 s, but time must not go backwards";
         assert!(backwards.ends_with(said), "{backwards}");
         let unknown = fault("time,a.x\n0,1\nNaN,3\n");
         assert!(unknown.ends_with("a.csv, row 3, time: NaN is no time"), "{unknown}");
-        let twice = fault("time,a.x [m],a.x [s]\n0,1,1\n");
+        let twice = fault("time,a.x,a.x\n0,1,1\n");
         assert!(twice.ends_with("a.csv: two columns are called a.x"), "{twice}");
     }
 
     #[test]
     fn what_is_no_table_of_a_run_is_refused() {
-        let fault = read("a.csv", "x,y\n0,1\n", None).unwrap_err().to_string();
+        let fault = read("a.csv", "x,y\n0,1\n").unwrap_err().to_string();
         assert!(fault.contains("the first column must be called time"), "{fault}");
         for (name, content) in [("metrics.json", "{}"), ("a.csv", "time,x\n0,1\n0\n")] {
-            let fault = read(name, content, None).unwrap_err();
+            let fault = read(name, content).unwrap_err();
             assert!(fault.exit_code() == 2 && fault.to_string().contains(name), "{fault}");
         }
-        let fault = read("a.parquet", "PAR1 and nothing else", None).unwrap_err().to_string();
+        let fault = read("a.parquet", "PAR1 and nothing else").unwrap_err().to_string();
         assert!(fault.contains("a.parquet is no table of recorded variables"), "{fault}");
     }
 }

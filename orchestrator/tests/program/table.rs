@@ -43,11 +43,8 @@ fn oracle_an_input_follows_the_rows_of_a_table() {
     assert_eq!(answers(&bench, &[]), [6.0, 6.0, 10.0, 10.0, 10.0]);
     let line = answers(&bench, &["--set", "drive.interpolation=linear"]);
     assert_eq!(line, [6.0, 6.0, 10.0, 4.0, 4.0]);
-    let set = ["--set", "drive.shift=1 s", "--set", "drive.scale.input=10", "--set"];
-    assert_eq!(
-        answers(&bench, &[&set[..], &["drive.input[1]=4"]].concat())[..4],
-        [80.0, 80.0, 80.0, 100.0]
-    );
+    let set = ["--set", "drive.time[2]=3 s", "--set", "drive.input[1]=4"];
+    assert_eq!(answers(&bench, &set)[..4], [8.0, 8.0, 8.0, 10.0]);
     // Processes of their own are for third-party code.
     assert_eq!(answers(&bench, &["--isolate"]), [6.0, 6.0, 10.0, 10.0, 10.0]);
     fs::write(bench.path("other.csv"), "time,input\n0,1\n").unwrap();
@@ -68,7 +65,7 @@ fn a_table_that_the_run_does_not_meet_is_told() {
     let late = told("time,input [m]\n10,3\n20,5\n", &[]);
     let said = "drive: its rows are from 10 s to 20 s, outside the run from 0 s to 4 s, in which it holds its first row";
     assert!(late.contains(said) && late.lines().count() == 1, "{late}");
-    let early = told(TABLE, &["--set", "drive.shift=-5 s"]);
+    let early = told("time,input [m]\n-4,3\n-1,5\n", &[]);
     assert!(early.contains("from -4 s to -1 s") && early.contains("its last row"), "{early}");
     // A constant, tables that cover a part of the run, and those that begin or end with it.
     let rows = ["-3,1", "9,1", "-3,1\n2,1", "3,1\n9,1", "-3,1\n9,1", "4,1\n9,1", "-3,1\n0,1"];
@@ -80,7 +77,7 @@ fn a_table_that_the_run_does_not_meet_is_told() {
 #[test]
 fn a_recorded_run_drives_another() {
     let bench = bench(TABLE);
-    let first = answers(&bench, &["--labels"]);
+    let first = answers(&bench, &[]);
     fs::copy(bench.path("out/loop/results.csv"), bench.path("flown.csv")).unwrap();
     let replay = DRIVEN
         .replace("drive.csv", "flown.csv")

@@ -142,8 +142,6 @@ fn inspect_filters_and_speaks_json() {
     assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
     let (_, text, _) = bench.call(&["inspect", "Model.fmu", "seed"]);
     assert!(text.contains("noise.seed") && !text.contains("output.direct"), "{text}");
-    let (_, text, _) = bench.call(&["inspect", "Model.fmu", "--causality", "input"]);
-    assert!(text.contains("input (1)") && !text.contains("parameter ("), "{text}");
     bench.fails(2, &["inspect", "Model.fmu", "sed"], "has no variable that fits \"sed\"");
 }
 

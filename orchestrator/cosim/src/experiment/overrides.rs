@@ -3,7 +3,6 @@
 use super::{Coupling, Experiment};
 use crate::choice::choice;
 use crate::error::Error;
-use crate::watch::OnInvalid;
 use clap::Args;
 use fmi_master::names;
 use std::collections::BTreeMap;
@@ -48,10 +47,6 @@ pub struct Overrides {
     /// Choose how components are stepped and values are passed on.
     #[arg(long, value_parser = choice::<Coupling>(&[("sequential", "gauss-seidel")]))]
     pub coupling: Option<Coupling>,
-    /// Choose what happens if an instance gives a value that is not finite, or not valid for its
-    /// type.
-    #[arg(long, value_parser = choice::<OnInvalid>(&[]))]
-    pub on_invalid: Option<OnInvalid>,
     /// Let the program at the other end of standard input and output give the moment in place of
     /// the controller: the law's name, and what identifies it. The Python package does so.
     #[arg(long, value_name = "NAME HASH", hide = true)]
@@ -130,7 +125,6 @@ impl Experiment {
         self.simulation.stop = overrides.stop.unwrap_or(self.simulation.stop);
         self.simulation.step = overrides.step.unwrap_or(self.simulation.step);
         self.simulation.coupling = overrides.coupling.unwrap_or(self.simulation.coupling);
-        self.simulation.on_invalid = overrides.on_invalid.unwrap_or(self.simulation.on_invalid);
         self.isolation.isolate = overrides.process.isolate.or(self.isolation.isolate);
         self.given = overrides.clone();
         let is_given = |assignment: &String| assignment.starts_with(&format!("{CONTROLLER}="));

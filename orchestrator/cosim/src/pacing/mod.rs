@@ -147,8 +147,8 @@ impl Pacer {
         } else {
             tick as f64 * self.clock.step()
         };
-        let after = Duration::try_from_secs_f64(simulated / self.report.factor.0)
-            .unwrap_or(Duration::MAX);
+        let after =
+            Duration::try_from_secs_f64(simulated / self.report.factor.0).unwrap_or(Duration::MAX);
         self.began.saturating_add(after)
     }
 
@@ -235,7 +235,8 @@ mod tests {
         assert_eq!(begins[3..8], [30, 56, 58, 60, 70]);
         // The values of tick 4, due at 50, came at 57.
         assert_eq!((report.deadlines, report.misses["controller"]), (10, 2));
-        let text = "factor 100: 2 of 10 deadlines missed; at worst controller at t = 8 s, 15.000 ms late";
+        let text =
+            "factor 100: 2 of 10 deadlines missed; at worst controller at t = 8 s, 15.000 ms late";
         assert_eq!(report.to_string(), text);
     }
 

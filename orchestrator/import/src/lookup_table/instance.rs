@@ -1,6 +1,6 @@
 //! An instance of a lookup table.
 
-use super::{Column, Form, HOLD, LookupTable};
+use super::{HOLD, LookupTable};
 use crate::warnings;
 use fmi_master::instance::{CallFailure, Instance, Outcome};
 use fmi_master::quantity::rounded;
@@ -26,15 +26,10 @@ impl LookupTableInstance {
         Self { name: name.into(), file: table.clone(), table, present: <_>::default() }
     }
 
-    /// Returns the time that is added to the times of all rows, s.
-    fn shift(&self) -> f64 {
-        self.table.numbers[self.table.columns.len() + 1]
-    }
-
     /// Goes to a time. Before the first row its values hold, and after the last row the values of
     /// that row.
     fn go_to(&mut self, time: f64) {
-        let (times, time) = (self.table.times(), time - self.shift());
+        let times = self.table.times();
         let is_past = |row: &f64| *row <= time + TOLERANCE * time.abs().max(1.0);
         let next = times.partition_point(is_past);
         let last = next.saturating_sub(1);
@@ -50,55 +45,16 @@ impl LookupTableInstance {
     /// time.
     fn get(&self, reference: u32) -> f64 {
         let (table, place) = (&self.table, reference as usize);
-        let count = table.columns.len();
-        let Some(column) = table.columns.get(place) else { return table.numbers[place] };
+        if place >= table.columns.len() {
+            return table.numbers[place];
+        }
         let (last, next, part) = self.present;
-        let is_held = table.numbers[count] == HOLD || !column.form.is_real();
         // Neither the difference of two values nor a product with zero may overflow.
-        let value = if is_held || part == 0.0 {
+        if part == 0.0 || table.numbers[table.interpolation()] == f64::from(HOLD) {
             table.value(last, place)
         } else {
             (1.0 - part) * table.value(last, place) + part * table.value(next, place)
-        };
-        table.numbers[count + 2 + place] * value
-    }
-
-    /// Returns the first column of an angle that is interpolated over more than half a turn, with
-    /// the row before it.
-    fn long_turn(&self) -> Option<(&Column, usize)> {
-        let Self { table, .. } = self;
-        let columns = table.columns.iter().enumerate();
-        let mut turns = columns.filter_map(|(place, column)| {
-            let half = match &column.form {
-                Form::Real(Some(unit)) if unit == "deg" => 180.0,
-                Form::Real(Some(unit)) if unit == "rad" => std::f64::consts::PI,
-                _ => return None,
-            };
-            let turn = |row: usize| table.value(row + 1, place) - table.value(row, place);
-            let row = (0..table.rows.saturating_sub(1)).find(|row| turn(*row).abs() > half)?;
-            Some((column, row))
-        });
-        turns.next().filter(|_| table.numbers[table.columns.len()] != HOLD)
-    }
-
-    fn set(&mut self, call: &'static str, reference: u32, value: f64) -> Outcome {
-        if !value.is_finite() {
-            return Err(CallFailure::answer(call, format!("{value} is not finite")));
         }
-        Arc::make_mut(&mut self.table.numbers)[reference as usize] = value;
-        Ok(())
-    }
-
-    fn get_whole(&self, references: &[u32], values: &mut [i32]) {
-        for (value, reference) in values.iter_mut().zip(references) {
-            // Only values of 32 bits are read as whole numbers.
-            *value = self.get(*reference) as i32;
-        }
-    }
-
-    fn set_whole(&mut self, call: &'static str, references: &[u32], values: &[i32]) -> Outcome {
-        let mut pairs = references.iter().zip(values);
-        pairs.try_for_each(|(reference, value)| self.set(call, *reference, (*value).into()))
     }
 }
 
@@ -111,26 +67,33 @@ impl Instance for LookupTableInstance {
     }
 
     fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        self.get_whole(references, values);
+        for (value, reference) in values.iter_mut().zip(references) {
+            *value = self.get(*reference) as i32;
+        }
         Ok(())
     }
 
-    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        self.get_whole(references, values);
-        Ok(())
+    fn get_boolean(&mut self, _references: &[u32], _values: &mut [i32]) -> Outcome {
+        Err(CallFailure::new("getBoolean", "a lookup table has no truth values"))
     }
 
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
-        let mut pairs = references.iter().zip(values);
-        pairs.try_for_each(|(reference, value)| self.set("setReal", *reference, *value))
+        for (reference, value) in references.iter().zip(values) {
+            if !value.is_finite() {
+                return Err(CallFailure::answer("setReal", format!("{value} is not finite")));
+            }
+            Arc::make_mut(&mut self.table.numbers)[*reference as usize] = *value;
+        }
+        Ok(())
     }
 
     fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        self.set_whole("setInteger", references, values)
+        let values: Vec<f64> = values.iter().copied().map(f64::from).collect();
+        self.set_real(references, &values)
     }
 
-    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        self.set_whole("setBoolean", references, values)
+    fn set_boolean(&mut self, _references: &[u32], _values: &[i32]) -> Outcome {
+        Err(CallFailure::new("setBoolean", "a lookup table has no truth values"))
     }
 
     fn set_string(&mut self, reference: u32, _value: &str) -> Outcome {
@@ -152,16 +115,9 @@ impl Instance for LookupTableInstance {
             ));
         }
         self.go_to(start);
-        if let Some((column, row)) = self.long_turn() {
-            let (name, [from, to]) = (&column.name, [row, row + 1].map(|row| row + 1));
-            warnings::warn(&format!(
-                "{}: {name} is interpolated the long way round between its rows {from} and {to}: add a whole turn to the later ones",
-                self.name
-            ));
-        }
         // One row is a constant.
         if let [first, .., last] = *self.table.times() {
-            let [first, last] = [first, last].map(|time| rounded(time + self.shift()));
+            let [first, last] = [first, last].map(rounded);
             if first > stop || last < start {
                 let held = if first > stop { "first" } else { "last" };
                 warnings::warn(&format!(

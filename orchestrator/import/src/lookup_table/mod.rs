@@ -1,12 +1,12 @@
 //! Lookup tables: CSV files whose columns over time are outputs. They need no library, and are
 //! described, set, stepped and read as FMUs are.
 
-mod description;
 mod instance;
 
+use fmi_master::description::{Interface, ModelDescription, Variable, VariableKind};
+use fmi_master::quantity::UnitDefinition;
 pub(crate) use instance::LookupTableInstance;
-use std::fs;
-use std::io;
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -15,23 +15,17 @@ pub fn is_lookup_table(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
 }
 
-/// Largest number of bytes of a file.
-const LARGEST: u64 = 1 << 30;
 /// Largest number of times and values up to which they are parameters.
 const MOST_PARAMETERS: usize = 1000;
 /// Kinds of interpolation: the value of the row before, or a straight line between two rows.
-const HOLD: f64 = 1.0;
-const LINEAR: f64 = 2.0;
-
-/// Largest magnitude of a time, s, with which all differences of times can be computed.
-const LONGEST: f64 = 1e12;
+const HOLD: i32 = 1;
+const LINEAR: i32 = 2;
 
 /// The columns of a file over time.
 ///
 /// All numbers lie in one list, in which the position of a number is the value reference of its
-/// variable: a place for each output, the kind of interpolation, the shift of all times, a factor of
-/// each column, the times of the rows (s, none earlier than the one before), and the values row by
-/// row.
+/// variable: a place for each output, the kind of interpolation, the times of the rows (s, none
+/// earlier than the one before), and the values row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LookupTable {
     columns: Vec<Column>,
@@ -44,47 +38,16 @@ pub(crate) struct LookupTable {
 #[derive(Clone, Debug, PartialEq)]
 struct Column {
     name: String,
-    form: Form,
-}
-
-/// Type of a column's values.
-#[derive(Clone, Debug, PartialEq)]
-enum Form {
-    /// Real numbers in a unit.
-    Real(Option<String>),
-    Integer,
-    Boolean,
+    unit: Option<String>,
 }
 
 impl Column {
-    /// Reads a heading: `name`, `name [unit]`, `name [Integer]` or `name [Boolean]`.
+    /// Reads a heading: `name` or `name [unit]`.
     fn new(heading: &str) -> Self {
         let parts = heading.strip_suffix(']').and_then(|rest| rest.rsplit_once(" ["));
-        let (name, form) = match parts {
-            None => (heading, Form::Real(None)),
-            Some((name, "Integer")) => (name, Form::Integer),
-            Some((name, "Boolean")) => (name, Form::Boolean),
-            Some((name, unit)) => (name, Form::Real(Some(unit.into()))),
-        };
-        Self { name: name.trim_end().into(), form }
+        let (name, unit) = parts.map_or((heading, None), |(name, unit)| (name, Some(unit.into())));
+        Self { name: name.trim_end().into(), unit }
     }
-
-    /// Reads a value, or returns what it must be.
-    fn value(&self, text: &str) -> Result<f64, &'static str> {
-        match (&self.form, text) {
-            (Form::Real(_), _) => number(text),
-            (Form::Integer, _) => {
-                text.parse().map(|value: i32| value.into()).or(Err("a whole number of 32 bits"))
-            }
-            (Form::Boolean, "0" | "false") => Ok(0.0),
-            (Form::Boolean, "1" | "true") => Ok(1.0),
-            (Form::Boolean, _) => Err("0, 1, false or true"),
-        }
-    }
-}
-
-fn number(text: &str) -> Result<f64, &'static str> {
-    text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or("a finite number")
 }
 
 impl LookupTable {
@@ -94,23 +57,10 @@ impl LookupTable {
     /// # Errors
     /// Returns a text that names the line and the column at fault.
     pub(crate) fn open(path: &Path) -> Result<Self, String> {
-        let fault = |error: io::Error| format!("cannot be opened: {error}");
-        let size = fs::metadata(path).map_err(fault)?.len();
-        if size > LARGEST {
-            return Err(format!("refused: it has {size} bytes, at most {LARGEST} are allowed"));
-        }
-        Self::parse(&fs::read(path).map_err(fault)?)
+        Self::parse(&std::fs::read(path).map_err(|error| format!("cannot be opened: {error}"))?)
     }
 
     fn parse(bytes: &[u8]) -> Result<Self, String> {
-        // The reader takes the rest of the file for the content of such quotation marks.
-        let is_open = |line: &[u8]| {
-            let pieces = line.split(|byte| *byte == b'"').count();
-            !line.starts_with(b"#") && pieces.is_multiple_of(2)
-        };
-        if let Some(place) = bytes.split(|byte| *byte == b'\n').position(is_open) {
-            return Err(format!("line {}: a quotation mark is not closed", place + 1));
-        }
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
@@ -131,40 +81,95 @@ impl LookupTable {
                 let (name, text) = (&headings[place], row[place].escape_default());
                 format!("line {line}: \"{name}\" is \"{text}\", it must be {expected}")
             };
-            let time = number(&row[0]).map_err(|expected| wrong(0, expected))?;
-            if time.abs() > LONGEST {
-                return Err(wrong(0, &format!("within {LONGEST:e} s of zero")));
-            }
+            let number = |place: usize| {
+                let number = row[place].parse().ok().filter(|value: &f64| value.is_finite());
+                number.ok_or_else(|| wrong(place, "a finite number"))
+            };
+            let time = number(0)?;
             if times.last().is_some_and(|before| *before > time) {
                 return Err(wrong(0, "no earlier than in the row before"));
             }
             times.push(time);
-            for (place, column) in (1..).zip(&columns) {
-                values.push(column.value(&row[place]).map_err(|expected| wrong(place, expected))?);
+            for place in 1..row.len() {
+                values.push(number(place)?);
             }
         }
         if times.is_empty() {
             return Err("is a lookup table without rows".into());
         }
-        let (count, rows) = (columns.len(), times.len());
-        let numbers = [vec![0.0; count], vec![HOLD, 0.0], vec![1.0; count], times, values].concat();
+        let rows = times.len();
+        let numbers = [vec![0.0; columns.len()], vec![f64::from(HOLD)], times, values].concat();
         Ok(Self { columns, numbers: numbers.into(), rows })
     }
 
-    /// Returns the position of the first time. The position of the kind of interpolation is the
-    /// number of columns.
-    fn first_time(&self) -> usize {
-        2 * self.columns.len() + 2
+    /// Returns the position of the kind of interpolation.
+    fn interpolation(&self) -> usize {
+        self.columns.len()
     }
 
     /// Returns the times of the rows, s.
     fn times(&self) -> &[f64] {
-        &self.numbers[self.first_time()..][..self.rows]
+        &self.numbers[self.interpolation() + 1..][..self.rows]
     }
 
     /// Returns the value of a column in a row.
     fn value(&self, row: usize, column: usize) -> f64 {
-        self.numbers[self.first_time() + self.rows + row * self.columns.len() + column]
+        let first = self.interpolation() + 1 + self.rows;
+        self.numbers[first + row * self.columns.len() + column]
+    }
+
+    /// Describes the variables in the form of an FMU, whose name is that of the file.
+    ///
+    /// # Errors
+    /// Returns a text that names a variable that the file has twice.
+    pub(crate) fn description(&self, name: &str) -> Result<ModelDescription, String> {
+        let items = vec![("hold".into(), HOLD), ("linear".into(), LINEAR)];
+        let columns = || self.columns.iter().map(|column| (&column.name, real(&column.unit)));
+        let mut entries: Vec<(String, VariableKind)> =
+            columns().map(|(name, kind)| (name.clone(), kind)).collect();
+        entries.push(("interpolation".into(), VariableKind::Enumeration { items }));
+        if self.rows * (1 + self.columns.len()) <= MOST_PARAMETERS {
+            let rows = 1..=self.rows;
+            let seconds = || real(&Some("s".into()));
+            entries.extend(rows.clone().map(|row| (format!("time[{row}]"), seconds())));
+            entries.extend(rows.flat_map(|row| {
+                columns().map(move |(name, kind)| (format!("{name}[{row}]"), kind))
+            }));
+        }
+        let entries = entries.into_iter().enumerate();
+        let variables: Vec<Variable> = entries
+            .map(|(place, (name, kind))| {
+                let is_output = place < self.columns.len();
+                Variable {
+                    name,
+                    reference: place as u32,
+                    causality: if is_output { "output" } else { "parameter" }.into(),
+                    variability: if is_output { "discrete" } else { "fixed" }.into(),
+                    kind,
+                    start: (!is_output).then(|| self.numbers[place].to_string()),
+                    ..Variable::default()
+                }
+            })
+            .collect();
+        let mut names = BTreeSet::new();
+        if let Some(twice) = variables.iter().find(|variable| !names.insert(&variable.name)) {
+            return Err(format!("is a lookup table in which \"{}\" has two meanings", twice.name));
+        }
+        let units = self.columns.iter().filter_map(|column| column.unit.as_deref());
+        let units: BTreeSet<&str> = units.chain(["s"]).collect();
+        Ok(ModelDescription {
+            fmi_version: "2.0".into(),
+            model_name: name.into(),
+            guid: name.into(),
+            description: format!("lookup table of {} rows", self.rows),
+            co_simulation: Some(Interface::default()),
+            units: units.into_iter().map(unit).collect(),
+            dependencies: (0..self.columns.len()).map(|output| (output, Vec::new())).collect(),
+            is_lookup_table: true,
+            has_structure: true,
+            variables,
+            ..ModelDescription::default()
+        })
     }
 }
 
@@ -191,6 +196,29 @@ fn columns(headings: &csv::StringRecord) -> Result<Vec<Column>, String> {
         return Err("is a lookup table with a column that has no name".into());
     }
     Ok(columns)
+}
+
+fn real(unit: &Option<String>) -> VariableKind {
+    VariableKind::Real {
+        unit: unit.clone(),
+        display_unit: None,
+        is_relative: false,
+        min: None,
+        max: None,
+        nominal: None,
+    }
+}
+
+/// Returns a unit that is only named. What it measures is defined by the FMU that the column is
+/// connected to.
+fn unit(name: &str) -> UnitDefinition {
+    UnitDefinition {
+        name: name.into(),
+        exponents: None,
+        factor: 1.0,
+        offset: 0.0,
+        displays: Vec::new(),
+    }
 }
 
 #[cfg(test)]
