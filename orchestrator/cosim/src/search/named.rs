@@ -32,34 +32,31 @@ impl Kind {
     /// All kinds, in the order in which they are listed.
     pub const ALL: [Self; 4] = [Self::Experiment, Self::Study, Self::Campaign, Self::Fmu];
 
+    /// Returns the word for a file of this kind with its article, that for several, and the command
+    /// that is usually called with one.
+    fn words(self) -> [&'static str; 3] {
+        match self {
+            Self::Experiment => ["an experiment", "experiments", "run"],
+            Self::Study => ["a study", "studies", "reproduce"],
+            Self::Campaign => ["a campaign", "campaigns", "campaign"],
+            Self::Fmu => ["an FMU", "FMUs", "inspect"],
+        }
+    }
+
     /// Returns the word for a file of this kind.
     pub fn word(self) -> &'static str {
-        match self {
-            Self::Experiment => "experiment",
-            Self::Study => "study",
-            Self::Campaign => "campaign",
-            Self::Fmu => "FMU",
-        }
+        let [word, ..] = self.words();
+        word.split_once(' ').map_or(word, |(_, word)| word)
     }
 
     /// Returns the word for several files of this kind.
     pub fn plural(self) -> &'static str {
-        match self {
-            Self::Experiment => "experiments",
-            Self::Study => "studies",
-            Self::Campaign => "campaigns",
-            Self::Fmu => "FMUs",
-        }
+        self.words()[1]
     }
 
     /// Returns the command that is usually called with a file of this kind.
     pub fn command(self) -> &'static str {
-        match self {
-            Self::Experiment => "run",
-            Self::Study => "reproduce",
-            Self::Campaign => "campaign",
-            Self::Fmu => "inspect",
-        }
+        self.words()[2]
     }
 
     /// Returns the kind of a file; `None` if it is of no kind, as a file that others extend.
@@ -79,29 +76,23 @@ impl Kind {
         let text = fs::read_to_string(path).ok()?;
         let kind = Self::of_text(&text)?;
         // A file that extends a campaign is a campaign, too.
-        let whole = (kind == Self::Experiment && sets(text.lines(), "extends"))
+        let whole = (kind == Self::Experiment && text.contains("extends"))
             .then(|| Source::new(path, text).ok())
             .flatten();
         whole.map_or(Some(kind), |source| Self::of_text(source.whole()))
     }
 
-    /// Returns the kind of a TOML file with this text, with or without faults. A file without a
-    /// title only serves to be extended, a file that names a paper is part of a study, and one in
-    /// which something varies is a campaign, as is one whose first keys name the experiment that
-    /// varies.
-    pub fn of_text(text: &str) -> Option<Self> {
-        let starts = |line: &str, with: &str| line.trim_start().starts_with(with);
-        let first = || text.lines().take_while(|line| !starts(line, "["));
-        let has_components = || text.lines().any(|line| starts(line, "[components."));
-        if text.lines().any(|line| starts(line, "[[vary]]"))
-            || (sets(first(), "title") && sets(first(), "experiment"))
-        {
-            Some(Self::Campaign)
-        } else {
-            let has_title = sets(text.lines(), "title") && !sets(text.lines(), "paper");
-            (has_title && (has_components() || sets(text.lines(), "extends")))
-                .then_some(Self::Experiment)
+    /// Returns the kind of a TOML file with this text. A file without a title only serves to be
+    /// extended, a file that names a paper is part of a study, and one in which something varies,
+    /// or that names the experiment that varies, is a campaign.
+    fn of_text(text: &str) -> Option<Self> {
+        let keys: toml::Table = text.parse().ok()?;
+        let has = |key: &str| keys.contains_key(key);
+        if has("vary") || has("title") && has("experiment") {
+            return Some(Self::Campaign);
         }
+        let is_experiment = has("title") && !has("paper") && (has("components") || has("extends"));
+        is_experiment.then_some(Self::Experiment)
     }
 
     /// Returns the end of the path of a file of this kind that has this name.
@@ -154,13 +145,6 @@ impl Kind {
     }
 }
 
-/// Returns whether one of these lines sets a key.
-fn sets<'a>(mut lines: impl Iterator<Item = &'a str>, key: &str) -> bool {
-    lines.any(|line| {
-        line.trim_start().strip_prefix(key).is_some_and(|rest| rest.trim_start().starts_with('='))
-    })
-}
-
 /// Adds an extension to a name that does not have it.
 fn with_extension(name: &Path, extension: &str) -> PathBuf {
     if has_extension(name, extension) {
@@ -194,13 +178,14 @@ pub fn find_any(name: &Path, kinds: &[Kind]) -> Result<PathBuf, Error> {
     }
     let mut others = Kind::ALL.to_vec();
     others.retain(|kind| !kinds.contains(kind) && !matches!(look(name, *kind), Ok(None)));
-    let is_fmu = others == [Kind::Fmu] || others.is_empty() && has_extension(name, "fmu");
-    Err(Error::experiment(if is_fmu && kinds == [Kind::Experiment] {
-        of_an_fmu(name)
-    } else if others.is_empty() {
+    let shown = name.display();
+    Err(Error::experiment(if others.is_empty() {
         unknown(name, kinds)
     } else {
-        of_another_kind(name, &others, kinds == [Kind::Fmu])
+        let what: Vec<&str> = others.iter().map(|kind| kind.words()[0]).collect();
+        let call = |kind: &Kind| format!("orchestrator {} {shown}", kind.command());
+        let calls: Vec<String> = others.iter().map(call).collect();
+        format!("{shown} is {}: {}", what.join(" and "), calls.join(", or "))
     }))
 }
 
@@ -227,60 +212,31 @@ fn look(name: &Path, kind: Kind) -> Result<Option<PathBuf>, Error> {
     Ok(None)
 }
 
-/// Describes the fault that the name of an FMU stands in place of that of an experiment.
-fn of_an_fmu(name: &Path) -> String {
-    let shown = name.display();
-    format!(
-        "{shown} is an FMU, and FMUs are run by an experiment: `orchestrator inspect {shown}` shows its variables, \
-         --fmu COMPONENT={} puts it into an existing experiment",
-        Kind::Fmu.file(name).display()
-    )
-}
-
-/// Names the commands that take a name of other kinds.
-fn of_another_kind(name: &Path, others: &[Kind], reads: bool) -> String {
-    let shown = name.display();
-    let what: Vec<String> = others
-        .iter()
-        .map(|kind| {
-            let article = if matches!(kind, Kind::Experiment | Kind::Fmu) { "an" } else { "a" };
-            format!("{article} {}", kind.word())
-        })
-        .collect();
-    let mut commands: Vec<&str> = others.iter().map(|kind| kind.command()).collect();
-    if reads {
-        // A user who inspects an FMU may want to see the content of another file, too.
-        commands.push("show");
-    }
-    let calls: Vec<String> =
-        commands.iter().map(|command| format!("orchestrator {command} {shown}")).collect();
-    format!("{shown} is {}: {}", what.join(" and "), calls.join(", or "))
-}
-
 /// Describes the fault that nothing has this name, with the nearest one that is installed or in the
 /// folder of the path.
 fn unknown(name: &Path, kinds: &[Kind]) -> String {
-    let stem = |kind: Kind, path: &Path| -> Option<String> {
-        Some(kind.name(path).file_name()?.to_string_lossy().into_owned())
-    };
     let folder = name.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
-    let beside = || fs::read_dir(folder).into_iter().flatten().flatten();
+    let beside: Vec<PathBuf> =
+        fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
     let mut there = Vec::new();
     for kind in kinds {
         let installed = kind.installed();
         there.extend(installed.iter().map(|path| kind.shortest(path, &installed)));
-        let own = beside().map(|entry| kind.file(&entry.path())).filter(|path| path.is_file());
-        there.extend(own.filter_map(|path| stem(*kind, &path)));
+        let own = beside.iter().map(|path| kind.file(path)).filter(|path| path.is_file());
+        there.extend(own.filter_map(|path| stem(&kind.name(&path))));
     }
-    let wrong = kinds.first().and_then(|kind| stem(*kind, &kind.file(name))).unwrap_or_default();
-    let hint = names::hint(&wrong, there.iter().map(String::as_str));
-    let mut words: Vec<&str> = kinds.iter().map(|kind| kind.word()).collect();
-    let last = words.pop().unwrap_or_default();
-    let before = if words.is_empty() { String::new() } else { words.join(", ") + " or " };
-    let shown = name.display();
+    let wrong = kinds.first().and_then(|kind| stem(&kind.name(&kind.file(name))));
+    let hint = names::hint(&wrong.unwrap_or_default(), there.iter().map(String::as_str));
+    let words: Vec<&str> = kinds.iter().map(|kind| kind.word()).collect();
     format!(
-        "there is no {before}{last} \"{shown}\", neither as a file nor among those that `orchestrator list` shows{hint}"
+        "there is no {} \"{}\", neither as a file nor among those that `orchestrator list` shows{hint}",
+        words.join(" or "),
+        name.display()
     )
+}
+
+fn stem(path: &Path) -> Option<String> {
+    Some(path.file_name()?.to_string_lossy().into_owned())
 }
 
 #[cfg(test)]
@@ -297,6 +253,7 @@ mod tests {
         assert_eq!(kind("extends = \"b.toml\"\n[[vary]]"), Some(Kind::Campaign));
         assert_eq!(kind("title = \"a\"\npaper = \"b\""), None);
         assert_eq!(kind(&experiment.replace("title", "# title")), None);
+        assert_eq!(kind("title = "), None);
         assert_eq!(kind("[package]\nname = \"a\""), None);
     }
 
