@@ -7,11 +7,6 @@ import pytest
 from conftest import EXPERIMENTS, TARGET, program
 
 ORDER = 'order = ["controller", "plant"]'
-CONNECTION = """connections = [
-    { from = "plant.attitude.*", to = "controller.attitude.*", convert_units = true },
-    { from = "plant.rate.*", to = "controller.rate.*" },
-    { from = "controller.moment.*", to = "plant.moment.*" },
-]"""
 METRIC = '{{ kind = "{}", signals = "rate", unit = {{ name = "cm", factor = 100.0 }}, {} }}'
 
 
@@ -29,7 +24,6 @@ def run(folder, *lines, arguments=()):
         (["[isolation]", "cpu = 60"], [], "[isolation] cpu has no effect"),
         (["[isolation]", "call_timeout = 5"], [], "[isolation] call_timeout has no effect"),
         (["[simulation]", 'coupling = "jacobi"', ORDER], [], "[simulation] order has no effect"),
-        ([CONNECTION], [], 'convert_units has no effect on the connection to "controller.attitude.*"'),
         (["[components.plant.parameters]", '"aerodynamics.lift.scale" = 0.9', '"planet.rate" = 0.0'], [], "planet.rate, aerodynamics.lift.scale have no effect: they are used with translation = entry"),
         (["[components.plant.parameters]", '"air.wind.east[1]" = 1e3'], [], "air.wind.east[1] has no effect: it is used with translation = entry and air.rows >= 1"),
     ],

@@ -8,7 +8,6 @@
 //! finished run, and [`ssp`] reads and writes systems as SSP archives.
 
 pub mod check;
-pub mod choice;
 pub mod closing;
 pub mod document;
 pub mod error;

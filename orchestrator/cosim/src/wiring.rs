@@ -78,17 +78,8 @@ pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>
                 Fault::To(message) => to.refuse(message),
             },
         )?;
-        let is_given = connection.scaling.is_some();
-        let converts = connected.iter().any(|wire| wire.scaling != Scaling::default());
         for wire in connected {
             let input = name(wire.to);
-            if wire.scaling != Scaling::default() && !connection.convert_units && !is_given {
-                return Err(to.refuse(format!(
-                    "the units of {} and {input} measure the same quantity on another scale: \
-                     write convert_units = true in this connection",
-                    name(wire.from)
-                )));
-            }
             if wire.scaling != Scaling::default() && wire.from.carrier != Carrier::Real {
                 return Err(to.refuse(format!("{input} is no real number: it cannot be scaled")));
             }
@@ -96,13 +87,6 @@ pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>
                 return Err(to.refuse(format!("the input {input} is connected twice")));
             }
             wires.push(wire);
-        }
-        if connection.convert_units && !converts {
-            tracing::warn!(
-                "{}: convert_units has no effect on the connection to \"{}\", whose units are equal",
-                experiment.source.path.display(),
-                to.written.text
-            );
         }
     }
     if !experiment.leaves_inputs_open {

@@ -12,10 +12,8 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 pub enum Coupling {
     /// One after the other, each component gets its inputs, is stepped, and passes its outputs on:
-    /// later components receive its responses to these inputs. Earlier versions called this
-    /// "gauss-seidel".
+    /// later components receive its responses to these inputs.
     #[default]
-    #[serde(alias = "gauss-seidel")]
     Sequential,
     /// All components get their inputs, and then all are stepped: each receives the outputs of the
     /// others after their last step.

@@ -91,11 +91,6 @@ fn a_recorded_run_drives_another() {
 #[test]
 fn oracle_units_of_a_table_are_those_of_the_input() {
     let bench = bench("time,input [mm]\n0,500\n");
-    let message = bench.refusal(&[]);
-    assert!(message.contains("convert_units = true"), "{message}");
-    let converted =
-        DRIVEN.replace("to = \"gain.input\"", "to = \"gain.input\"\nconvert_units = true");
-    fs::write(bench.path("loop.toml"), converted).unwrap();
     assert_eq!(answers(&bench, &[]), [1.0; 5]);
     fs::write(bench.path("drive.csv"), "time,input [m/s]\n0,500\n").unwrap();
     let message = bench.refusal(&[]);

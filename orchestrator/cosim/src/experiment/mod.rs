@@ -167,10 +167,6 @@ pub struct Connection {
     /// Input that the values go to, as `component.input` or `component.prefix.*`.
     #[schemars(with = "String")]
     pub to: Spanned<String>,
-    /// Whether values are converted if the units differ only in scale. Otherwise such a connection
-    /// is refused.
-    #[serde(default)]
-    pub convert_units: bool,
     /// Scaling in place of the conversion of units, as an SSP archive gives it. This is not a key of
     /// an experiment file.
     #[serde(skip)]

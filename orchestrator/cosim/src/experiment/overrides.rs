@@ -1,10 +1,12 @@
 //! Changes that the command line makes to an experiment.
 
 use super::{Coupling, Experiment};
-use crate::choice::choice;
 use crate::error::Error;
 use clap::Args;
 use fmi_master::names;
+use serde::Deserialize;
+use serde::de::IntoDeserializer;
+use serde::de::value::Error as Wrong;
 use std::collections::BTreeMap;
 use std::path::Path;
 use toml::{Spanned, Value};
@@ -44,8 +46,9 @@ pub struct Overrides {
     /// Length of the communication step, s.
     #[arg(long, value_name = "SECONDS")]
     pub step: Option<f64>,
-    /// Choose how components are stepped and values are passed on.
-    #[arg(long, value_parser = choice::<Coupling>(&[("sequential", "gauss-seidel")]))]
+    /// Step components one after the other, each with the outputs of those before it (sequential),
+    /// or all at once with the last outputs of the others (jacobi).
+    #[arg(long, value_parser = coupling)]
     pub coupling: Option<Coupling>,
     /// Let the program at the other end of standard input and output give the moment in place of
     /// the controller: the law's name, and what identifies it. The Python package does so.
@@ -54,6 +57,11 @@ pub struct Overrides {
     /// Process in which the instances run.
     #[command(flatten)]
     pub process: Process,
+}
+
+/// Reads a coupling as files name it.
+fn coupling(text: &str) -> Result<Coupling, Wrong> {
+    Coupling::deserialize(text.into_deserializer())
 }
 
 /// Process in which the instances run.

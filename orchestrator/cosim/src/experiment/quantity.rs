@@ -59,18 +59,16 @@ pub enum Band {
     Relative(f64),
 }
 
-const FREQUENCY: &str = "rms-above needs a frequency above 0, and no other kind has one";
-
 impl Measure {
     /// Describes what is wrong with the measure, or returns `None` if nothing is.
     pub fn fault(&self) -> Option<String> {
         self.quantity().err()
     }
 
-    /// Returns the quantity that the measure computes.
+    /// Returns what is measured.
     ///
     /// # Errors
-    /// Returns an error if a key has no meaning for the kind of the measure, or is missing.
+    /// Returns a fault of the measure: a key that its kind does not have, or a number out of range.
     pub fn quantity(&self) -> Result<Quantity, String> {
         if self.every == 0 {
             return Err("every = 0: it must be at least 1".into());
@@ -78,60 +76,39 @@ impl Measure {
         if self.over.is_some_and(|[from, to]| from >= to) {
             return Err("over must be [from, to] with from below to".into());
         }
-        let quantity = self.quantity_of_kind()?;
-        let takes_bound = matches!(
-            quantity,
-            Quantity::Leaving { .. }
-                | Quantity::Settling { .. }
-                | Quantity::Rises { .. }
-                | Quantity::Share { .. }
-        );
-        let settles = matches!(quantity, Quantity::Settling { .. });
-        let faults = [
-            (
-                self.bound.is_some() && !takes_bound,
-                "bound is for leaving, settling, rises and share only",
-            ),
-            (
-                self.unit.is_some() && (takes_bound || quantity == Quantity::Pulses),
-                "settling, pulses, leaving, rises and share have no unit of the signals to replace: leave unit out",
-            ),
-            (self.band.is_some() && !settles, "band is for settling only"),
-            (self.hold != 0.0 && !settles, "hold is for settling only"),
-            (
-                self.frequency.is_some_and(|frequency| frequency > 0.0)
-                    && self.kind != MeasureKind::RmsAbove,
-                FREQUENCY,
-            ),
+        let takes: &[&str] = match self.kind {
+            MeasureKind::Pulses => &[],
+            MeasureKind::Rises | MeasureKind::Leaving | MeasureKind::Share => &["bound"],
+            MeasureKind::Settling => &["bound", "band", "hold"],
+            MeasureKind::RmsAbove => &["unit", "frequency"],
+            _ => &["unit"],
+        };
+        let given = [
+            ("bound", self.bound.is_some()),
+            ("band", self.band.is_some()),
+            ("hold", self.hold != 0.0),
+            ("frequency", self.frequency.is_some_and(|frequency| frequency > 0.0)),
+            ("unit", self.unit.is_some()),
         ];
-        match faults.iter().find(|(is_there, _)| *is_there) {
-            Some((_, fault)) => Err((*fault).into()),
-            None => Ok(quantity),
+        if let Some((key, _)) = given.iter().find(|(key, is)| *is && !takes.contains(key)) {
+            return Err(format!("{key} does nothing for this kind: leave {key} out"));
         }
-    }
-
-    /// Reads the keys of the kind. Further keys are ignored.
-    fn quantity_of_kind(&self) -> Result<Quantity, String> {
-        Ok(match self.kind {
-            MeasureKind::Rms => Quantity::Rms,
-            MeasureKind::Mean => Quantity::Mean,
-            MeasureKind::Integral => Quantity::Integral,
-            MeasureKind::P99 => Quantity::P99,
-            MeasureKind::Largest => Quantity::Largest,
-            MeasureKind::Last => Quantity::Last,
-            MeasureKind::Pulses => Quantity::Pulses,
-            MeasureKind::Variation => Quantity::Variation,
-            MeasureKind::Rises => Quantity::Rises { least: self.bound.unwrap_or(0.0) },
-            MeasureKind::Leaving => match self.bound {
-                Some(bound) if bound > 0.0 => Quantity::Leaving { bound },
-                _ => return Err("leaving needs a bound above 0".into()),
-            },
-            MeasureKind::Share => match self.bound {
-                Some(bound) if bound >= 0.0 => Quantity::Share { bound },
-                _ => return Err("share needs a bound of at least 0".into()),
-            },
-            MeasureKind::Settling => {
-                let within = match (self.band, self.bound) {
+        Ok(match (self.kind, self.bound) {
+            (MeasureKind::Rms, _) => Quantity::Rms,
+            (MeasureKind::Mean, _) => Quantity::Mean,
+            (MeasureKind::Integral, _) => Quantity::Integral,
+            (MeasureKind::P99, _) => Quantity::P99,
+            (MeasureKind::Largest, _) => Quantity::Largest,
+            (MeasureKind::Last, _) => Quantity::Last,
+            (MeasureKind::Pulses, _) => Quantity::Pulses,
+            (MeasureKind::Variation, _) => Quantity::Variation,
+            (MeasureKind::Rises, least) => Quantity::Rises { least: least.unwrap_or(0.0) },
+            (MeasureKind::Leaving, Some(bound)) if bound > 0.0 => Quantity::Leaving { bound },
+            (MeasureKind::Leaving, _) => return Err("leaving needs a bound above 0".into()),
+            (MeasureKind::Share, Some(bound)) if bound >= 0.0 => Quantity::Share { bound },
+            (MeasureKind::Share, _) => return Err("share needs a bound of at least 0".into()),
+            (MeasureKind::Settling, bound) => {
+                let within = match (self.band, bound) {
                     (Some(band), None) if band > 0.0 => Some(Band::Relative(band)),
                     (None, Some(bound)) if bound > 0.0 => Some(Band::Absolute(bound)),
                     _ => None,
@@ -141,9 +118,9 @@ impl Measure {
                 )?;
                 Quantity::Settling { within, hold: self.hold }
             }
-            MeasureKind::RmsAbove => match self.frequency {
+            (MeasureKind::RmsAbove, _) => match self.frequency {
                 Some(frequency) if frequency > 0.0 => Quantity::RmsAbove { frequency },
-                _ => return Err(FREQUENCY.into()),
+                _ => return Err("rms-above needs a frequency above 0".into()),
             },
         })
     }

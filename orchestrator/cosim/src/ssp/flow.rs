@@ -282,7 +282,7 @@ impl<'a> Flow<'a> {
         scaling = scaling.then(between(unit, self.unit_of_variable(last).as_ref())?);
         let name = |node: &Node| Spanned::new(0..0, format!("{}.{}", node.0, node.1));
         let (from, to, scaling) = (name(start), name(last), Some(scaling));
-        Ok(Connection { from, to, convert_units: false, scaling })
+        Ok(Connection { from, to, scaling })
     }
 
     /// Returns the value that comes to the beginning of a way, if one is known. The value of the
