@@ -113,6 +113,79 @@ impl TwoLoopSmc {
         let accelerations = reference.accelerations - d_rate * (2.0 * w) - d * (w * w);
         Reference { angles, rates, accelerations }
     }
+
+    /// Advances both integrals over the interval before a tick, unless they rest, and finds whether
+    /// the actuators saturated in it.
+    fn integrate(&self, memory: &mut TwoLoopMemory, measured: &Measurement, rests: bool) {
+        let TwoLoopSettings { body, period, achieved_moment_used, threshold, .. } = &self.settings;
+        if !rests {
+            memory.outer_integral += memory.angle_error * *period;
+            memory.inner_integral += memory.rate_error * *period;
+        }
+        let achieved = measured.achieved_moment.filter(|_| *achieved_moment_used);
+        memory.saturated = memory.commanded.shortfall(body, achieved).norm() > *threshold;
+    }
+
+    /// The outer loop: Jia, (4), (7).
+    fn outer(
+        &self,
+        measured: &Measurement,
+        command: &Reference,
+        integral: &Vector3<f64>,
+        rests: bool,
+    ) -> Outer {
+        let TwoLoopSettings { form, kinematics, outer, .. } = &self.settings;
+        let Measurement { angles, rates, .. } = measured;
+        let inverse = kinematics.r_inverse(angles);
+        let angle_rates = kinematics.r(angles) * rates;
+        let (sign, _) = form.signs();
+        let e_w = command.angles - angles;
+        let e_w_dot = command.rates - angle_rates;
+        let s_w = outer.sliding(&e_w, integral);
+        let x = command.rates + outer.k().component_mul(&e_w) + outer.layer.value(&s_w) * sign;
+        let omega_c = inverse * x;
+        // The derivative ω̇_c follows from ω_c = R⁻¹ x.
+        let integrand = if rests { Vector3::zeros() } else { outer.k().component_mul(&e_w) };
+        let s_w_dot = e_w_dot + integrand;
+        let x_dot = command.accelerations
+            + outer.k().component_mul(&e_w_dot)
+            + outer.layer.slope(&s_w).component_mul(&s_w_dot) * sign;
+        let omega_c_dot = inverse * (x_dot - kinematics.r_dot(angles, &angle_rates) * omega_c);
+        Outer { error: e_w, sliding: s_w, rates: omega_c, accelerations: omega_c_dot }
+    }
+
+    /// The inner loop: Jia, (8), (11) without M_d, which is not known.
+    fn inner(&self, measured: &Measurement, outer: &Outer, integral: &Vector3<f64>) -> Inner {
+        let TwoLoopSettings { form, body, inner, .. } = &self.settings;
+        let rates = &measured.rates;
+        let (_, sign) = form.signs();
+        let omega_e = outer.rates - rates;
+        let s_n = inner.sliding(&omega_e, integral);
+        let acceleration = outer.accelerations
+            + inner.k().component_mul(&omega_e)
+            + inner.layer.value(&s_n) * sign;
+        let moment = body.inertia * acceleration + rates.cross(&(body.inertia * rates));
+        Inner { error: omega_e, sliding: s_n, moment }
+    }
+}
+
+/// Outcome of the outer loop at a tick.
+struct Outer {
+    /// Angle error e_w (rad), and sliding variable s_w (rad).
+    error: Vector3<f64>,
+    sliding: Vector3<f64>,
+    /// Commanded rates ω_c (rad/s), and their derivative (rad/s²).
+    rates: Vector3<f64>,
+    accelerations: Vector3<f64>,
+}
+
+/// Outcome of the inner loop at a tick.
+struct Inner {
+    /// Rate error ω_e (rad/s), and sliding variable s_n (rad/s).
+    error: Vector3<f64>,
+    sliding: Vector3<f64>,
+    /// Moment, N m.
+    moment: Vector3<f64>,
 }
 
 impl Controller for TwoLoopSmc {
@@ -128,69 +201,27 @@ impl Controller for TwoLoopSmc {
         measured: &Measurement,
         reference: ReferenceAt,
     ) -> Vector3<f64> {
-        let TwoLoopSettings {
-            form,
-            kinematics,
-            body,
-            period,
-            outer,
-            inner,
-            achieved_moment_used,
-            anti_windup,
-            threshold,
-            ..
-        } = &self.settings;
         let reference = reference(time);
         let command = self.filter(memory, measured, &reference);
-        let rests = *anti_windup && memory.saturated;
+        let rests = self.settings.anti_windup && memory.saturated;
         if memory.started {
-            if !rests {
-                memory.outer_integral += memory.angle_error * *period;
-                memory.inner_integral += memory.rate_error * *period;
-            }
-            let achieved = measured.achieved_moment.filter(|_| *achieved_moment_used);
-            memory.saturated = memory.commanded.shortfall(body, achieved).norm() > *threshold;
+            self.integrate(memory, measured, rests);
         }
-        let Measurement { angles, rates, .. } = measured;
-        let inverse = kinematics.r_inverse(angles);
-        let angle_rates = kinematics.r(angles) * rates;
-        let (outer_sign, inner_sign) = form.signs();
-
-        // Outer loop: Jia, (4), (7).
-        let e_w = command.angles - angles;
-        let e_w_dot = command.rates - angle_rates;
-        let s_w = outer.sliding(&e_w, &memory.outer_integral);
-        let x =
-            command.rates + outer.k().component_mul(&e_w) + outer.layer.value(&s_w) * outer_sign;
-        let omega_c = inverse * x;
-        // The derivative ω̇_c follows from ω_c = R⁻¹ x.
-        let integrand = if rests { Vector3::zeros() } else { outer.k().component_mul(&e_w) };
-        let s_w_dot = e_w_dot + integrand;
-        let x_dot = command.accelerations
-            + outer.k().component_mul(&e_w_dot)
-            + outer.layer.slope(&s_w).component_mul(&s_w_dot) * outer_sign;
-        let omega_c_dot = inverse * (x_dot - kinematics.r_dot(angles, &angle_rates) * omega_c);
-
-        // Inner loop: Jia, (8), (11) without M_d, which is not known.
-        let omega_e = omega_c - rates;
-        let s_n = inner.sliding(&omega_e, &memory.inner_integral);
-        let acceleration =
-            omega_c_dot + inner.k().component_mul(&omega_e) + inner.layer.value(&s_n) * inner_sign;
-        let moment = body.inertia * acceleration + rates.cross(&(body.inertia * rates));
-
+        let outer = self.outer(measured, &command, &memory.outer_integral, rests);
+        let inner = self.inner(measured, &outer, &memory.inner_integral);
         *memory = TwoLoopMemory {
             started: true,
             command,
             reference,
-            angle_error: e_w,
-            rate_error: omega_e,
-            outer_sliding: s_w,
-            inner_sliding: s_n,
-            rate_command: omega_c,
-            commanded: Commanded::new(measured, moment),
+            angle_error: outer.error,
+            rate_error: inner.error,
+            outer_sliding: outer.sliding,
+            inner_sliding: inner.sliding,
+            rate_command: outer.rates,
+            commanded: Commanded::new(measured, inner.moment),
             ..*memory
         };
-        moment
+        inner.moment
     }
 
     fn limited(&mut self, memory: &mut TwoLoopMemory, applied: &Vector3<f64>) {
