@@ -125,13 +125,12 @@ CAMPAIGN = f"""#:schema {EXPERIMENTS}/../../schema/campaign.json
 title = "Few cases"
 experiment = "{EXPERIMENTS}/lqr.toml"
 cases = 4
+metrics = ["ems_deg"]
+keep = {{ by = "ems_deg", worst = 1 }}
 
 [[vary]]
 parameter = "plant.disturbance.seed"
 case = 1
-
-[keep]
-every = 4
 """
 
 

@@ -32,9 +32,6 @@ pub(crate) struct Fly {
     /// experiment and report.html with its curves over those of other cases.
     #[arg(long, help_heading = "Search")]
     worst: bool,
-    /// Begin no further cases of the search after this time, s.
-    #[arg(long, value_name = "SECONDS", help_heading = "Search", requires = "worst", value_parser = clap::value_parser!(u64).range(1..))]
-    time: Option<u64>,
     #[command(flatten)]
     many: Many,
     // The headings of these would apply to all arguments that follow.
@@ -94,7 +91,7 @@ pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> R
     if let Some(case) = asked.part.case {
         return fly_case(&plan, case, asked, overrides, out, interrupt);
     }
-    let options = asked.many.options(asked.time, interrupt);
+    let options = asked.many.options(interrupt);
     if asked.worst {
         let outcome = search::search(&plan, &options)?;
         if !asked.many.quiet {
@@ -160,7 +157,7 @@ fn fly_case(
 }
 
 fn summary(report: &flights::CampaignReport, out: &mut impl Write) -> std::io::Result<()> {
-    let Findings { title, cases, status, limits, measures, answer } = &report.findings;
+    let Findings { title, cases, status, limits, measures } = &report.findings;
     let rate = report.flown as f64 / report.elapsed;
     writeln!(out, "{title}")?;
     let several = if *cases == 1 { "case" } else { "cases" };
@@ -208,16 +205,6 @@ fn summary(report: &flights::CampaignReport, out: &mut impl Write) -> std::io::R
             quantile(1.0),
             measure.unit,
             summary.worst
-        )?;
-    }
-    if let Some(answer) = answer {
-        writeln!(
-            out,
-            "  P({} broken) < {} with {} %: {}",
-            answer.question.limit,
-            answer.question.below,
-            100.0 * answer.question.confidence,
-            answer.in_words()
         )?;
     }
     writeln!(out, "  {}", report.out.join("report.html").display())

@@ -10,7 +10,6 @@ use cosim::search::named::{Kind, find};
 use cosim::ssp;
 use cosim::system::{Opened, System};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 use sweep::runner;
 
 /// Runs experiments with FMUs of FMI 2.0 and 3.0, for co-simulation or model exchange.
@@ -112,13 +111,12 @@ pub(crate) struct Many {
 }
 
 impl Many {
-    /// Returns the options of the cases, which may take `time` (s) together.
-    pub(crate) fn options(&self, time: Option<u64>, interrupt: &Interrupt) -> runner::Options {
+    /// Returns the options of the cases.
+    pub(crate) fn options(&self, interrupt: &Interrupt) -> runner::Options {
         runner::Options {
             out: self.out.clone(),
             jobs: self.jobs,
             fresh: self.fresh,
-            time: time.map(Duration::from_secs),
             quiet: self.quiet,
             interrupt: interrupt.clone(),
         }

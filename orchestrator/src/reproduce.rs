@@ -38,7 +38,7 @@ pub(crate) fn reproduce(
     let Reproduce { study, members, many, process } = asked;
     let study = Study::load_with(&find(&study, Kind::Study)?, members)?;
     let overrides = Overrides { process, ..Default::default() };
-    let options = many.options(None, interrupt);
+    let options = many.options(interrupt);
     let report = reproduce::reproduce(&study, &many.fmu_dir, &overrides, &options)?;
     if !many.quiet {
         summary(&report, out)?;

@@ -34,7 +34,7 @@ pub(crate) fn draw(
     options: &Options,
 ) -> Result<Option<Figure>, Error> {
     let begin = || {
-        let mut flight = Flight::new(plan, false, &options.interrupt)?.without_ends();
+        let mut flight = Flight::new(plan, false, &options.interrupt)?;
         flight.leave_out_margins();
         let panels = Panel::resolve_all(flight.system())?;
         Ok::<_, Error>((flight, panels))

@@ -7,9 +7,8 @@ use cosim::document::Source;
 use cosim::error::Error;
 use cosim::experiment::Measure;
 use cosim::signal::Signal;
-use fmi_master::names;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use sweep::vary::{DesignKind, Vary};
@@ -38,7 +37,7 @@ pub struct Campaign {
     /// Seed of all random numbers. Case k depends on the seed and k alone.
     #[serde(default = "one")]
     pub seed: u64,
-    /// Number of cases, and with `until` the largest number. The design `levels` needs none.
+    /// Number of cases. The design `levels` needs none.
     pub cases: Option<u64>,
     /// Design that places the cases in the space of the varied parameters.
     #[serde(default)]
@@ -59,8 +58,6 @@ pub struct Campaign {
     /// Limits that each case keeps or breaks.
     #[serde(default, rename = "limit")]
     pub limits: Vec<Limit>,
-    /// Question that ends the campaign as soon as it is answered.
-    pub until: Option<Until>,
     /// Choice of the cases whose results are kept in full.
     #[serde(default)]
     pub keep: Keep,
@@ -88,24 +85,6 @@ pub struct Limit {
     pub at_most: Option<f64>,
     /// Smallest value that keeps the limit, in the unit of the measure.
     pub at_least: Option<f64>,
-    /// Whether a case ends as soon as it breaks the limit. The measure must be of the kind
-    /// `largest`, and the limit an `at_most`.
-    #[serde(default)]
-    pub ends: bool,
-}
-
-/// A question that ends the campaign as soon as it is answered: whether a limit is broken with a
-/// probability below a bound.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema, Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct Until {
-    /// Id of the limit.
-    pub limit: String,
-    /// Probability with which the limit may be broken.
-    pub below: f64,
-    /// Confidence of the answer, by default 0.95.
-    #[serde(default = "confidence")]
-    pub confidence: f64,
 }
 
 /// Choice of the cases whose results are kept in full, as `orchestrator run` writes them.
@@ -117,10 +96,6 @@ pub struct Keep {
     /// Measure that orders the cases.
     #[schemars(with = "Option<String>")]
     pub by: Option<Spanned<String>>,
-    /// Largest number of kept cases that broke a limit, were lost or failed.
-    pub failed: u32,
-    /// Interval m, so that every m-th case is kept.
-    pub every: Option<u64>,
 }
 
 /// A search for the worst case.
@@ -134,8 +109,6 @@ pub struct Search {
     /// last of them.
     #[serde(default = "thousand")]
     pub cases: u64,
-    /// Value of the measure at which the search ends.
-    pub enough: Option<f64>,
 }
 
 /// Returns the name of the column that says whether a limit was kept.
@@ -145,10 +118,6 @@ pub fn kept_column(limit: &str) -> String {
 
 fn one() -> u64 {
     1
-}
-
-fn confidence() -> f64 {
-    0.95
 }
 
 fn thousand() -> u64 {
@@ -167,9 +136,6 @@ impl Campaign {
         campaign.source = source;
         campaign.check_ids()?;
         campaign.limits.iter().try_for_each(|limit| campaign.check_limit(limit))?;
-        if let Some(until) = &campaign.until {
-            campaign.check_until(until)?;
-        }
         campaign.check_numbers()?;
         Ok(campaign)
     }
@@ -218,47 +184,23 @@ impl Campaign {
             "one of at_most and at_least is needed"
         } else if !limit.at_most.or(limit.at_least).is_some_and(f64::is_finite) {
             "the limit is not a finite number"
-        } else if limit.ends && limit.at_most.is_none() {
-            "ends needs an at_most, because the largest value only grows"
         } else {
             return Ok(());
         };
         Err(self.limit_fault(limit, problem))
     }
 
-    fn check_until(&self, until: &Until) -> Result<(), Error> {
-        let ids = self.limits.iter().map(|limit| limit.id.as_str());
-        if !ids.clone().any(|id| id == until.limit) {
-            let hint = names::hint(&until.limit, ids);
-            let problem = format!("[until] there is no limit \"{}\"{hint}", until.limit);
-            return Err(self.fault(problem));
-        }
-        for (key, value) in [("below", until.below), ("confidence", until.confidence)] {
-            if !(value > 0.0 && value < 1.0) {
-                let problem = format!("[until] {key} = {value}, but it must be between 0 and 1");
-                return Err(self.fault(problem));
-            }
-        }
-        if self.design != DesignKind::Random {
-            return Err(self.fault("[until] needs independent cases: design = \"random\""));
-        }
-        Ok(())
-    }
-
     fn check_numbers(&self) -> Result<(), Error> {
-        if let Some(Search { cases, enough, largest }) = &self.search
-            && (*cases == 0 || enough.is_some_and(f64::is_nan))
-        {
-            let problem = "[search] cases must be at least 1, and enough a number";
-            return Err(self.source.error(&largest.span(), problem));
-        }
         let faults = [
             (self.cases == Some(0), "cases = 0, but it must be at least 1"),
+            (
+                self.search.as_ref().is_some_and(|search| search.cases == 0),
+                "[search] cases = 0, but it must be at least 1",
+            ),
             (
                 self.keep.worst > 0 && self.keep.by.is_none(),
                 "[keep] worst needs by, the measure that orders the cases",
             ),
-            (self.keep.every == Some(0), "[keep] every = 0, but it must be at least 1"),
             (self.vary.is_empty(), "nothing varies: add a [[vary]]"),
         ];
         match faults.into_iter().find(|(is_there, _)| *is_there) {

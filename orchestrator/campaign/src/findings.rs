@@ -1,6 +1,6 @@
 //! Findings of a campaign.
 
-use crate::definition::{Limit, Until, kept_column};
+use crate::definition::{Limit, kept_column};
 use crate::flight::CaseStatus;
 use crate::plan::Plan;
 use crate::sensitivity::{Input, Sensitivity, sensitivities};
@@ -23,8 +23,6 @@ pub struct Findings {
     pub limits: Vec<LimitFinding>,
     /// Measures over all cases.
     pub measures: Vec<Measured>,
-    /// Answer to the question of the campaign.
-    pub answer: Option<Answer>,
 }
 
 /// A limit over all cases.
@@ -53,36 +51,8 @@ pub struct Measured {
     pub sensitivities: Vec<Sensitivity>,
 }
 
-/// Answer to the question that ends a campaign.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Answer {
-    /// The question.
-    pub question: Until,
-    /// Whether the probability is below the bound; none if the cases do not decide it.
-    pub holds: Option<bool>,
-    /// Probability at the last look, with the confidence of that look.
-    pub broken: Probability,
-    /// Confidence of each look, so that all together have the confidence of the question.
-    pub confidence_of_each_look: f64,
-}
-
-impl Answer {
-    /// Returns the answer in words.
-    pub fn in_words(&self) -> &'static str {
-        match self.holds {
-            Some(true) => "yes",
-            Some(false) => "no",
-            None => "not decided",
-        }
-    }
-}
-
 /// Computes the findings from a table of cases.
-pub(crate) fn findings(
-    plan: &Plan,
-    table: &Reader,
-    answer: Option<Answer>,
-) -> Result<Findings, Error> {
+pub(crate) fn findings(plan: &Plan, table: &Reader) -> Result<Findings, Error> {
     let cases = table.rows();
     let mut status: BTreeMap<&'static str, u64> =
         CaseStatus::ALL.iter().map(|status| (status.name(), 0)).collect();
@@ -118,7 +88,7 @@ pub(crate) fn findings(
             sensitivities: sensitivities(&inputs, &values),
         });
     }
-    Ok(Findings { title: plan.campaign.title.clone(), cases, status, limits, measures, answer })
+    Ok(Findings { title: plan.campaign.title.clone(), cases, status, limits, measures })
 }
 
 /// Returns the numbers of the cases that broke a limit.
@@ -146,26 +116,9 @@ fn says(plan: &Plan, limit: &Limit) -> String {
 /// Returns the numbers of the cases whose results are to be kept in full.
 pub(crate) fn chosen(plan: &Plan, table: &Reader) -> Result<BTreeSet<u64>, Error> {
     let keep = &plan.campaign.keep;
-    let mut chosen = BTreeSet::new();
-    if let Some(by) = &keep.by {
-        chosen.extend(worst(&table.column(by.get_ref())?.numbers(), keep.worst as usize));
-    }
-    if keep.failed > 0 {
-        let mut broken: BTreeSet<u64> = BTreeSet::new();
-        for limit in &plan.campaign.limits {
-            broken.extend(breaking(table, limit)?);
-        }
-        if let Values::Text(names) = table.column("status")? {
-            let bad = [CaseStatus::Lost.name(), CaseStatus::Failed.name()];
-            let is_bad = |case: &u64| bad.contains(&names[*case as usize].as_str());
-            broken.extend((0..table.rows()).filter(is_bad));
-        }
-        chosen.extend(broken.into_iter().take(keep.failed as usize));
-    }
-    if let Some(every) = keep.every {
-        chosen.extend((0..table.rows()).step_by(usize::try_from(every).unwrap_or(usize::MAX)));
-    }
-    Ok(chosen)
+    let Some(by) = &keep.by else { return Ok(BTreeSet::new()) };
+    let cases = worst(&table.column(by.get_ref())?.numbers(), keep.worst as usize);
+    Ok(cases.into_iter().collect())
 }
 
 /// Returns the numbers of the cases with the largest values, the largest first.

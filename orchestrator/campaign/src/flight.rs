@@ -10,7 +10,7 @@ use cosim::variation::SettingValue;
 use cosim_report::recording::watch::Watch;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use sweep::flight::{Bound, Flown, columns};
+use sweep::flight::{Flown, columns};
 use sweep::table::{CaseTable, Column, Values};
 
 /// How a case ended.
@@ -18,7 +18,7 @@ use sweep::table::{CaseTable, Column, Values};
 pub enum CaseStatus {
     /// It reached its stop time.
     Completed,
-    /// It broke a limit that ends cases, or an FMU ended it, which is not a fault.
+    /// An FMU ended it, which is not a fault.
     Ended,
     /// It was lost, as the experiment defines it.
     Lost,
@@ -64,8 +64,6 @@ pub struct Row {
 pub struct Flight<'a> {
     plan: &'a Plan,
     instances: sweep::flight::Flight<'a>,
-    /// Limits that end a case, by their positions.
-    ends: Vec<usize>,
 }
 
 impl<'a> Flight<'a> {
@@ -74,21 +72,9 @@ impl<'a> Flight<'a> {
     /// # Errors
     /// Returns an error if an archive cannot be opened.
     pub fn new(plan: &'a Plan, resets: bool, interrupt: &'a Interrupt) -> Result<Self, Error> {
-        let ends = plan.campaign.limits.iter().enumerate().filter(|(_, limit)| limit.ends);
-        let ends = ends.filter_map(|(place, limit)| {
-            let metric = limit.measure.get_ref().clone();
-            Some((place, Bound { metric, at_most: limit.at_most? }))
-        });
-        let (ends, bounds) = ends.unzip();
         let flight =
             sweep::flight::Flight::new(&plan.sweep, &mut Opened::default(), resets, interrupt)?;
-        Ok(Self { plan, instances: flight.ending_at(bounds), ends })
-    }
-
-    /// Lets cases go on that break a limit.
-    #[must_use]
-    pub fn without_ends(self) -> Self {
-        Self { instances: self.instances.ending_at(Vec::new()), ..self }
+        Ok(Self { plan, instances: flight.ending_when_lost() })
     }
 
     /// Leaves out the margins of cases, which are flown for their curves.
@@ -135,20 +121,16 @@ impl<'a> Flight<'a> {
         values: Vec<SettingValue>,
         others: &mut [&mut dyn Observer],
     ) -> Result<Row, Error> {
-        let Flown { case, values, metrics, outcome, without_margins, broken, time } =
+        let Flown { case, values, metrics, outcome, without_margins, time } =
             self.instances.fly_with(case, values, others)?;
-        let (status, message) = match outcome.and(without_margins.map_or(Ok(()), Err)) {
-            Ok(()) => (CaseStatus::Completed, String::new()),
-            Err(error) => match (&error, broken) {
-                (_, Some(bound)) => {
-                    let limit = &self.plan.campaign.limits[self.ends[bound]];
-                    (CaseStatus::Ended, format!("limit {} broken", limit.id))
-                }
-                (Error::Lost { .. }, None) => (CaseStatus::Lost, error.to_string()),
-                (Error::EndedByInstance { .. }, None) => (CaseStatus::Ended, error.to_string()),
-                _ => (CaseStatus::Failed, error.to_string()),
-            },
+        let outcome = outcome.and(without_margins.map_or(Ok(()), Err));
+        let status = match &outcome {
+            Ok(()) => CaseStatus::Completed,
+            Err(Error::Lost { .. }) => CaseStatus::Lost,
+            Err(Error::EndedByInstance { .. }) => CaseStatus::Ended,
+            Err(_) => CaseStatus::Failed,
         };
+        let message = outcome.err().map(|error| error.to_string()).unwrap_or_default();
         let numbers: Vec<Option<f64>> =
             self.plan.recorded.iter().map(|recorded| metrics.number(&recorded.name)).collect();
         let limits_kept = self.plan.limits().map(|(limit, place)| {

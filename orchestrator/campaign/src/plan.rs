@@ -3,7 +3,6 @@
 use crate::definition::{Campaign, Limit, kept_column};
 use crate::prepare::{Recorded, keys, observe, read_experiment, recorded};
 use cosim::error::Error;
-use cosim::experiment::MeasureKind;
 use cosim::files;
 use cosim::system::Opened;
 use cosim_metrics::metrics::{Meters, Metrics};
@@ -119,11 +118,6 @@ impl Plan {
         for limit in limits {
             let name = limit.measure.get_ref();
             let measure = self.sweep.experiment().observe.metrics.get(name);
-            let is_largest = measure.is_some_and(|measure| measure.kind == MeasureKind::Largest);
-            if limit.ends && !is_largest {
-                let problem = "ends needs a measure of the kind largest, because it only grows";
-                return Err(self.campaign.limit_fault(limit, problem));
-            }
             if measure.is_some() && !measured.units.contains_key(name) {
                 let problem =
                     format!("\"{name}\" has no value, because an FMU lacks its variables");

@@ -4,7 +4,7 @@
 mod figures;
 
 use crate::cloud;
-use crate::findings::{Answer, Findings, LimitFinding, Measured, chosen, worst};
+use crate::findings::{Findings, LimitFinding, Measured, chosen, worst};
 use crate::flight::Flight;
 use crate::plan::Plan;
 use crate::sensitivity::{Estimate, Sensitivity};
@@ -70,10 +70,7 @@ fn keep(
         let folder = out.join("cases").join(case.to_string());
         let (title, _) = plan.write_case(*case, &folder)?;
         // The flight is over, and its instances are freed, where it was begun.
-        let fly = || {
-            let flight = Flight::new(plan, false, interrupt)?.without_ends();
-            flight.keep(*case, &folder, &title)
-        };
+        let fly = || Flight::new(plan, false, interrupt)?.keep(*case, &folder, &title);
         system.apart(interrupt, &[&folder], fly)?;
     }
     Ok(())
@@ -148,29 +145,16 @@ fn varied(plan: &Plan) -> Markup {
     }
 }
 
-fn answered(answer: &Answer) -> Markup {
-    let word = answer.in_words();
-    html! {
-        p {
-            "Is the probability of breaking " code { (answer.question.limit) } " below "
-            (answer.question.below) ", with " (percent(answer.question.confidence)) " confidence? "
-            (verdict(answer.holds, word))
-            " (" (answer.broken.events) " of " (answer.broken.cases) " cases broke it)"
-        }
-    }
-}
-
 fn limits(plan: &Plan, findings: &Findings) -> Markup {
     let ended = |name: &str| findings.status.get(name).copied().unwrap_or(0);
     html! {
         p {
             (cases(ended("completed"))) " completed"
-            @for (status, words) in [("ended", "ended early by a limit or an FMU"), ("lost", "lost"), ("failed", "failed")] {
+            @for (status, words) in [("ended", "ended early by an FMU"), ("lost", "lost"), ("failed", "failed")] {
                 @if ended(status) > 0 { ", " (ended(status)) " " (words) }
             }
             "."
         }
-        @if let Some(answer) = &findings.answer { (answered(answer)) }
         @if findings.limits.is_empty() { p { "The campaign defines no limits." } }
         @else { (limit_table(&findings.limits, plan.campaign.design)) }
     }

@@ -1,7 +1,6 @@
 //! Flies a campaign on all cores, merges its parts, and writes tables and the report.
 
-use crate::definition::kept_column;
-use crate::findings::{Answer, Findings, findings};
+use crate::findings::{Findings, findings};
 use crate::flight::{CaseStatus, Flight, table};
 use crate::plan::Plan;
 use crate::prepare::Recorded;
@@ -18,8 +17,7 @@ use std::time::Instant;
 use sweep::error::Error;
 use sweep::flight::can_reset;
 use sweep::parts::{self, PartResult, Store};
-use sweep::runner::{self, Options, Part};
-use sweep::statistics::{Probability, looks};
+use sweep::runner::{self, Options, Part, Work};
 use sweep::table::{Reader, Values, Writer};
 
 /// Folder of the parts among the results.
@@ -46,7 +44,7 @@ pub struct CampaignReport {
 /// Remaining work of a campaign, for programs that share it among machines.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Remaining {
-    /// Number of cases that are needed, as far as the finished parts show.
+    /// Number of all cases.
     pub cases: u64,
     /// First and last-plus-one case of each part that is missing.
     pub missing: Vec<[u64; 2]>,
@@ -57,62 +55,21 @@ pub fn folder(plan: &Plan, out: Option<&Path>) -> PathBuf {
     out.map_or_else(|| Path::new("out").join(plan.name()), Path::to_path_buf)
 }
 
-/// Work of a campaign. Of each part the numbers of cases that broke each limit are remembered.
-type Work<'a> = runner::Work<'a, Vec<u64>>;
-
-fn work<'a>(plan: &'a Plan, out: &'a Path) -> Work<'a> {
+fn work<'a>(plan: &'a Plan, out: &'a Path) -> Work<'a, ()> {
     let store = Store { folder: out.join(PARTS), keys: &plan.sweep.keys };
-    let broken = |result: &PartResult| {
-        let limits = plan.campaign.limits.iter();
-        let broken = limits.map(|limit| match result.rows.column(&kept_column(&limit.id)) {
-            Some(Values::Flag(flags)) => flags.iter().filter(|is_kept| !**is_kept).count() as u64,
-            _ => 0,
-        });
-        broken.collect()
-    };
-    Work::new(&plan.campaign.title, out, vec![store], broken)
+    Work::new(&plan.campaign.title, out, vec![store], |_| ())
 }
 
-/// Returns the parts of a campaign that begin before a case.
-fn parts_below(plan: &Plan, case: u64) -> impl Iterator<Item = Part> {
-    let parts = parts::parts(plan.sweep.cases()).take_while(move |part| part.start < case);
-    parts.map(|cases| Part { sweep: 0, cases })
-}
-
-/// Returns the number of cases that are needed as far as the parts show, those that are missing,
-/// and the answer to the campaign's question if it has one and the parts are all there.
-fn needed(plan: &Plan, work: &mut Work) -> (u64, Vec<Part>, Option<Answer>) {
-    let total = plan.sweep.cases();
-    let Some(until) = &plan.campaign.until else {
-        return (total, work.missing(parts_below(plan, total)), None);
-    };
-    let mut limits = plan.campaign.limits.iter();
-    let limit = limits.position(|limit| limit.id == until.limit).unwrap_or(0);
-    let (counts, each) = looks(until.below, until.confidence, total, parts::LENGTH);
-    let mut answer = None;
-    for cases in counts {
-        let missing = work.missing(parts_below(plan, cases));
-        if !missing.is_empty() {
-            return (cases, missing, None);
-        }
-        let broken = work.done.range(..(0, cases)).map(|(_, (_, broken))| broken[limit]).sum();
-        let broken = Probability::new(broken, cases, each);
-        let is_decided = broken.high <= until.below || broken.low > until.below;
-        let holds = is_decided.then_some(broken.high <= until.below);
-        answer =
-            Some(Answer { question: until.clone(), holds, broken, confidence_of_each_look: each });
-        if is_decided {
-            return (cases, Vec::new(), answer);
-        }
-    }
-    (total, Vec::new(), answer)
+/// Returns the parts of a campaign.
+fn all_parts(plan: &Plan) -> impl Iterator<Item = Part> {
+    parts::parts(plan.sweep.cases()).map(|cases| Part { sweep: 0, cases })
 }
 
 /// Returns the remaining work of a campaign.
 pub fn remaining(plan: &Plan, out: &Path) -> Remaining {
-    let (cases, missing, _) = needed(plan, &mut work(plan, out));
+    let missing = work(plan, out).missing(all_parts(plan));
     let missing = missing.into_iter().map(|Part { cases, .. }| [cases.start, cases.end]);
-    Remaining { cases, missing: missing.collect() }
+    Remaining { cases: plan.sweep.cases(), missing: missing.collect() }
 }
 
 /// Flies the parts that lie in a range of cases and are not there yet, and writes nothing else.
@@ -132,9 +89,9 @@ pub fn fly_range(plan: &Plan, range: &Range<u64>, options: &Options) -> Result<u
     }
     let out = folder(plan, options.out.as_deref());
     let mut work = work(plan, &out);
-    let requested = parts_below(plan, range.end).filter(|part| range.start <= part.cases.start);
+    let requested = all_parts(plan).filter(|part| range.contains(&part.cases.start));
     let requested = if options.fresh { requested.collect() } else { work.missing(requested) };
-    let flown = requested.iter().map(|part| part.cases.end - part.cases.start).sum();
+    let flown = requested.iter().map(Part::count).sum();
     fly_parts(plan, &requested, options, &mut work)?;
     Ok(flown)
 }
@@ -153,23 +110,18 @@ pub fn fly(plan: &Plan, options: &Options) -> Result<CampaignReport, Error> {
         fs::remove_dir_all(&parts).map_err(Single::file(&parts))?;
     }
     let mut work = work(plan, &out);
-    let mut flown = 0;
-    let (cases, answer) = loop {
-        let (cases, missing, answer) = needed(plan, &mut work);
-        if missing.is_empty() {
-            break (cases, answer);
-        }
-        if flown == 0 {
-            // An earlier report would not fit the new cases if the work is ended early.
-            locked.remove(&FILES)?;
-        }
-        flown += missing.iter().map(|part| part.cases.end - part.cases.start).sum::<u64>();
-        fly_parts(plan, &missing, options, &mut work)?;
-    };
+    let missing = work.missing(all_parts(plan));
+    if !missing.is_empty() {
+        // An earlier report would not fit the new cases if the work is ended early.
+        locked.remove(&FILES)?;
+    }
+    let flown = missing.iter().map(Part::count).sum();
+    fly_parts(plan, &missing, options, &mut work)?;
     let path = out.join("cases.parquet");
-    merge(plan, &work, cases)?;
+    merge(plan, &work)?;
     let table = Reader::open(&path)?;
-    let findings = findings(plan, &table, answer)?;
+    let findings = findings(plan, &table)?;
+    let cases = findings.cases;
     if findings.status[CaseStatus::Failed.name()] == cases {
         // Their common cause may lie outside, so none of them is kept.
         fs::remove_dir_all(&parts).map_err(Single::file(&parts))?;
@@ -213,7 +165,7 @@ fn fly_parts(
     plan: &Plan,
     missing: &[Part],
     options: &Options,
-    work: &mut Work,
+    work: &mut Work<()>,
 ) -> Result<(), Error> {
     if missing.is_empty() {
         return Ok(());
@@ -251,11 +203,11 @@ fn of_case(case: u64, error: Single) -> Error {
     }
 }
 
-/// Merges the parts of the first `cases` cases into one table.
-fn merge(plan: &Plan, work: &Work, cases: u64) -> Result<(), Single> {
+/// Merges the parts into one table.
+fn merge(plan: &Plan, work: &Work<()>) -> Result<(), Single> {
     let path = work.out.join("cases.parquet");
     let mut writer = Writer::create(&path, &[("units", plan.units())])?;
-    for part in parts_below(plan, cases) {
+    for part in all_parts(plan) {
         writer.add(work.stores[0].read(&part.cases)?.rows)?;
     }
     writer.finish()

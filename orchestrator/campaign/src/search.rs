@@ -109,10 +109,9 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
     folder.remove(&FILES)?;
     let mut names = plan.recorded.iter().map(|recorded| &recorded.name);
     let measure = names.position(|name| name == search.largest.get_ref()).unwrap_or_default();
-    let is_late = || options.time.is_some_and(|time| begin.elapsed() >= time);
     let system = plan.sweep.system(&mut Opened::default())?;
     let quiet = options.quiet || system.is_closed;
-    let look = || look_in_threads(plan, search, measure, (options, quiet), &is_late);
+    let look = || look_in_threads(plan, search, measure, (options, quiet));
     let Found { searches, ended, tried } = system.apart(&options.interrupt, &[], look)?;
     let worst = tried.iter().filter(|case| !case.value.is_nan());
     let worst = worst.max_by(|a, b| a.value.total_cmp(&b.value)).or(tried.first());
@@ -159,7 +158,6 @@ fn look_in_threads(
     search: &Search,
     measure: usize,
     (options, quiet): (&Options, bool),
-    is_late: &dyn Fn() -> bool,
 ) -> Result<Found, Single> {
     let progress = Parts::new("cases", &plan.campaign.title, search.cases, 0, quiet);
     let (orders, waiting) = channel::<Order>();
@@ -175,7 +173,7 @@ fn look_in_threads(
         for _ in 0..runner::threads(options.jobs, [&plan.sweep]) {
             scope.spawn(|| serve(plan, &options.interrupt, &waiting));
         }
-        let result = look(&searched, search, &orders, is_late);
+        let result = look(&searched, search, &orders);
         // The threads end when no more cases can be ordered.
         drop(orders);
         result
@@ -217,8 +215,7 @@ fn serve(plan: &Plan, interrupt: &Interrupt, waiting: &Mutex<Receiver<Order>>) {
         let mut fly = || {
             let current = match flight.take() {
                 Some(flight) => flight,
-                // A case that ends at its limit would hide how far it exceeds it.
-                None => Flight::new(plan, false, interrupt)?.without_ends(),
+                None => Flight::new(plan, false, interrupt)?,
             };
             let values = plan.sweep.values_at(&order.point, CASE);
             flight.insert(current).fly_with(CASE, values, &mut [])
@@ -273,23 +270,14 @@ impl Searched<'_> {
     }
 
     /// Returns why the search is to end after this generation, if it is.
-    fn ended(&self, search: &Search, late: bool) -> Result<Option<&'static str>, Single> {
+    fn ended(&self, search: &Search) -> Result<Option<&'static str>, Single> {
         match self.failure.lock().take() {
             Some(Single::Interrupted { .. }) => return Ok(Some("it was interrupted")),
             Some(error) => return Err(error),
             None => {}
         }
-        let tried = self.tried.lock();
-        let best = tried.iter().map(|case| case.value).fold(f64::NEG_INFINITY, f64::max);
-        Ok(if search.enough.is_some_and(|enough| best >= enough) {
-            Some("the value is enough")
-        } else if tried.len() as u64 >= search.cases {
-            Some("all cases are used up")
-        } else if late {
-            Some("the time is used up")
-        } else {
-            None
-        })
+        let is_over = self.tried.lock().len() as u64 >= search.cases;
+        Ok(is_over.then_some("all cases are used up"))
     }
 }
 
@@ -299,7 +287,6 @@ fn look(
     searched: &Searched,
     search: &Search,
     orders: &Sender<Order>,
-    is_late: &dyn Fn() -> bool,
 ) -> Result<(u64, &'static str), Single> {
     let plan = searched.plan;
     let dimensions = plan.sweep.varied.len();
@@ -321,7 +308,7 @@ fn look(
         loop {
             let is_over = strategy.next_parallel().is_some();
             sorted = searched.sort(sorted);
-            if let Some(ended) = searched.ended(search, is_late())? {
+            if let Some(ended) = searched.ended(search)? {
                 return Ok((number + 1, ended));
             }
             if is_over {

@@ -325,12 +325,6 @@ impl Meters {
         (self.samples, self.completed) = (0, false);
     }
 
-    /// Returns the value of a metric of the communication points seen so far; `None` if it has
-    /// none.
-    pub fn number(&self, name: &str) -> Option<f64> {
-        self.gauges.get(name)?.as_ref()?.value()
-    }
-
     /// Returns the single values of the metrics that keep them, by name, in the order of time.
     pub fn samples(&self) -> BTreeMap<String, Vec<f64>> {
         let gauges =

@@ -28,24 +28,12 @@ pub struct Flown {
     pub values: Vec<SettingValue>,
     /// Metrics of the case.
     pub metrics: Metrics,
-    /// How the case ended. An error is an answer of an instance, or the end of a case that was lost
-    /// or that broke a bound.
+    /// How the case ended. An error is an answer of an instance, or the end of a case that was lost.
     pub outcome: Result<(), Error>,
     /// Why the loop has no margins although the experiment asks for them, if it has none.
     pub without_margins: Option<Error>,
-    /// Position of the bound that ended the case.
-    pub broken: Option<usize>,
     /// Simulated time that the case reached, s.
     pub time: f64,
-}
-
-/// A metric and the largest value with which a case goes on.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Bound {
-    /// Name of the metric, whose value only grows.
-    pub metric: String,
-    /// Largest value with which a case goes on.
-    pub at_most: f64,
 }
 
 /// Instances that fly one case after the other.
@@ -59,7 +47,6 @@ pub struct Flight<'a> {
     resets: bool,
     /// Whether computing times of components are measured.
     times: bool,
-    bounds: Vec<Bound>,
     /// Linearisation of each case with its instances, if the experiment asks for margins.
     lineariser: Option<Lineariser>,
     linearised: Option<Run>,
@@ -93,19 +80,16 @@ impl<'a> Flight<'a> {
             interrupt,
             resets,
             times: false,
-            bounds: Vec::new(),
             lineariser,
             linearised: None,
             found: None,
         })
     }
 
-    /// Lets a case end as soon as it is lost, or exceeds one of these bounds.
+    /// Lets a case end as soon as it is lost.
     #[must_use]
-    pub fn ending_at(mut self, bounds: Vec<Bound>) -> Self {
-        self.meters = self.meters.ending_when_lost();
-        self.bounds = bounds;
-        self
+    pub fn ending_when_lost(self) -> Self {
+        Self { meters: self.meters.ending_when_lost(), ..self }
     }
 
     /// Measures the computing times of components.
@@ -167,8 +151,7 @@ impl<'a> Flight<'a> {
     ) -> Result<Flown, Error> {
         let changes = self.sweep.changes(&values);
         self.meters.reset();
-        let mut watch =
-            Watch { meters: &mut self.meters, bounds: &self.bounds, broken: None, time: None };
+        let mut watch = Watch { meters: &mut self.meters, time: None };
         let mut observers: Vec<&mut dyn Observer> = Vec::with_capacity(1 + others.len());
         observers.extend(others.iter_mut().map(|other| &mut **other as &mut dyn Observer));
         // The watch comes last, because it may end the case.
@@ -193,7 +176,7 @@ impl<'a> Flight<'a> {
             outcome
         });
         drop(observers);
-        let Watch { broken, time, .. } = watch;
+        let Watch { time, .. } = watch;
         let outcome = match outcome {
             Err(error) if !is_of_case(&error) => return Err(error),
             // An instance may fail before the flight for a reason other than its values, such as a
@@ -212,7 +195,7 @@ impl<'a> Flight<'a> {
         let (margins, without_margins) = self.margins(&changes)?;
         metrics.asked.extend(margins);
         let time = time.unwrap_or(self.sweep.span[0]);
-        Ok(Flown { case, values, metrics, outcome, without_margins, broken, time })
+        Ok(Flown { case, values, metrics, outcome, without_margins, time })
     }
 
     /// Starts new instances with the texts among these changes, and without their numbers. What the
@@ -273,11 +256,9 @@ fn is_of_case(error: &Error) -> bool {
     }
 }
 
-/// Measures a case, and ends it as soon as it exceeds a bound.
+/// Measures a case, and notes its time.
 struct Watch<'a> {
     meters: &'a mut Meters,
-    bounds: &'a [Bound],
-    broken: Option<usize>,
     /// Time of the last communication point, if there was any.
     time: Option<f64>,
 }
@@ -285,17 +266,7 @@ struct Watch<'a> {
 impl Observer for Watch<'_> {
     fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
         self.time = Some(sample.time);
-        self.meters.observe(sample)?;
-        for (place, Bound { metric, at_most }) in self.bounds.iter().enumerate() {
-            // A value that is not a number is not within the bound.
-            let is_within = self.meters.number(metric).is_none_or(|number| number <= *at_most);
-            if !is_within {
-                self.broken = Some(place);
-                let what = metric.clone();
-                return Err(Error::Lost { what, time: sample.time, reason: String::new() });
-            }
-        }
-        Ok(())
+        self.meters.observe(sample)
     }
 }
 

@@ -16,7 +16,6 @@ use std::num::NonZero;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::thread;
-use std::time::Duration;
 
 /// Options of the work on many cases.
 #[derive(Clone, Debug, Default)]
@@ -28,8 +27,6 @@ pub struct Options {
     /// Whether cases that are kept already are flown again, and the results of an earlier search
     /// replaced.
     pub fresh: bool,
-    /// Time after which a search begins no further generation.
-    pub time: Option<Duration>,
     /// Whether the progress display is suppressed.
     pub quiet: bool,
     /// Interrupt through which the work can be ended from outside.
@@ -46,7 +43,8 @@ pub struct Part {
 }
 
 impl Part {
-    fn count(&self) -> u64 {
+    /// Returns the number of its cases.
+    pub fn count(&self) -> u64 {
         self.cases.end - self.cases.start
     }
 }

@@ -39,31 +39,6 @@ impl Probability {
     }
 }
 
-/// Returns the number of cases without an event that prove a probability below `bound`.
-pub fn cases_without_event(bound: f64, confidence: f64) -> u64 {
-    ((1.0 - confidence).ln() / (-bound).ln_1p()).ceil() as u64
-}
-
-/// Numbers of cases at which a campaign looks whether a question is answered, and the confidence of
-/// each look. All looks together err with at most `1 - confidence`.
-pub fn looks(bound: f64, confidence: f64, most: u64, multiple: u64) -> (Vec<u64>, f64) {
-    // The first look comes where no event would be enough; further ones at twice as many cases.
-    let counts = |each: f64| {
-        let first = cases_without_event(bound, each).next_multiple_of(multiple);
-        let doubled = std::iter::successors(Some(first), |count| count.checked_mul(2));
-        let mut counts: Vec<u64> = doubled.take_while(|count| *count < most).collect();
-        counts.push(most);
-        counts
-    };
-    let mut number = counts(confidence).len();
-    let each = |number: usize| 1.0 - (1.0 - confidence) / number as f64;
-    // More confidence of each look may need more cases and thus fewer looks.
-    while counts(each(number)).len() > number {
-        number += 1;
-    }
-    (counts(each(number)), each(number))
-}
-
 /// Numbers that describe a measure over all cases that have it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
@@ -184,20 +159,10 @@ mod tests {
     }
 
     #[test]
-    fn cases_that_prove_a_bound() {
-        assert_eq!(cases_without_event(1e-4, 0.95), 29_956);
+    fn oracle_cases_without_an_event_prove_a_bound() {
+        // As many as ln(0.05)/ln(1 - 1e-4), rounded up.
         assert!(Probability::new(0, 29_956, 0.95).high <= 1e-4);
         assert!(Probability::new(0, 29_955, 0.95).high > 1e-4);
-    }
-
-    #[test]
-    fn looks_share_the_error_among_them() {
-        let (counts, each) = looks(1e-2, 0.95, 5000, 250);
-        assert_eq!(*counts.last().unwrap(), 5000);
-        assert!((counts.len() as f64 * (1.0 - each) - 0.05).abs() < 1e-12);
-        assert!(Probability::new(0, counts[0], each).high <= 1e-2);
-        assert!(counts[..counts.len() - 1].iter().all(|count| count % 250 == 0));
-        assert_eq!(looks(1e-4, 0.95, 1000, 250).0, [1000]);
     }
 
     #[test]

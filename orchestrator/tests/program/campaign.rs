@@ -93,14 +93,6 @@ fn the_page_of_a_single_case_has_no_deviation() {
 }
 
 #[test]
-fn oracle_a_limit_can_end_a_case() {
-    let campaign = CAMPAIGN.replace("at_most = 8.0", "at_most = 4.0\nends = true");
-    let rows = flown(&bench(&campaign.replace("[1e9, 2.0]", "[1e9]")), &[]);
-    assert_eq!(rows[2], "1,1,1000000000,8,8,false,ended,3,limit small broken");
-    assert_eq!(rows[3], "2,2,1000000000,9,9,false,ended,2,limit small broken");
-}
-
-#[test]
 fn a_case_that_an_instance_ended_early_keeps_no_limit() {
     let bench = Bench::made(LOOP, &Recipe { flags: &["-DENDS=1"], ..Recipe::default() });
     let discards = "set = { \"plant.fail.status\" = 2 }\n\n[signals]";
@@ -216,22 +208,6 @@ fn an_instance_that_cannot_be_reset_is_made_anew() {
 }
 
 #[test]
-fn a_campaign_ends_when_its_question_is_answered() {
-    let asked = |below: f64| {
-        let text = format!("{RANDOM}[until]\nlimit = \"small\"\nbelow = {below}\n");
-        let bench = bench(&text.replace("cases = 1100", "cases = 100000"));
-        flown(&bench, &["--jobs", "2"]);
-        bench.json("out/c/summary.json")
-    };
-    // (1 + gain)^3 is above 7.9 with a probability of 1 - (7.9^(1/3) - 1) = 0.00837.
-    let often = asked(0.2);
-    assert_eq!((&often["answer"]["holds"], &often["cases"]), (&json!(true), &json!(250)));
-    let rarely = asked(0.001);
-    assert_eq!(rarely["answer"]["holds"], json!(false));
-    assert!(rarely["cases"].as_u64().unwrap() < 20_000, "{}", rarely["cases"]);
-}
-
-#[test]
 fn a_wrong_file_is_refused_with_the_key_the_line_and_the_nearest_name() {
     for (from, to, said) in [
         ("title = ", "titel = ", "did you mean \"title\"?"),
@@ -281,11 +257,6 @@ fn a_wrong_file_is_refused_with_the_key_the_line_and_the_nearest_name() {
             "c.toml:29: there is no metric or measure \"larges\"; did you mean \"largest\"?",
         ),
         ("at_most = 8.0", "", "one of at_most and at_least is needed"),
-        (
-            "measure = \"largest\"\nat_most = 8.0",
-            "measure = \"last\"\nat_most = 8.0\nends = true",
-            "ends needs a measure of the kind largest",
-        ),
         ("design = \"levels\"", "cases = 5\ndesign = \"levels\"", "the values have 6 combinations"),
         ("design = \"levels\"", "design = \"random\"", "cases is missing"),
         (

@@ -153,7 +153,6 @@ fn a_bad_value_is_blamed_on_its_option() {
         (&["campaign", "gains", "--case", "-1"], "'-1' for '--case"),
         (&["campaign", "gains", "--case", "6"], "--case 6: "),
         (&["campaign", "gains", "--cases", "-5..3"], "'-5..3' for '--cases"),
-        (&["campaign", "gains", "--worst", "--time", "-1"], "'-1' for '--time"),
         (&["reproduce", "papers", "--members", "-1"], "'-1' for '--members"),
         (&["margins", "loop", "--at", "-5", "--open", "plant.input"], "--at -5: "),
     ] {

@@ -113,17 +113,7 @@ fn keys_that_contradict_each_other_are_refused_with_the_name() {
             "at_most = 7.9\n[[limit]]\nid = \"small\"\nmeasure = \"last\"\nat_most = 1.0",
             "two [[limit]] with the id \"small\"",
         ),
-        (
-            "at_most = 7.9",
-            "at_most = 7.9\n[until]\nlimit = \"small\"\nbelow = 1.5",
-            "between 0 and 1",
-        ),
         ("at_most = 7.9", "at_most = 7.9\n[search]\nlargest = \"last\"\ncases = 0", "at least 1"),
-        (
-            "at_most = 7.9",
-            "at_most = 7.9\n[search]\nlargest = \"last\"\nenough = nan",
-            "enough a number",
-        ),
         ("id = \"last\"", "id = \"time\"", "two columns \"time\""),
         ("id = \"last\"", "id = \"gain.gain\"", "two columns \"gain.gain\""),
         ("id = \"last\"", "id = \"kept.small\"", "two columns \"kept.small\""),

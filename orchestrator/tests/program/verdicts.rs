@@ -87,24 +87,6 @@ fn a_campaign_says_which_limits_are_kept_and_which_are_broken() {
 }
 
 #[test]
-fn a_question_is_answered_by_yes_by_no_or_not_at_all() {
-    // (1 + gain)^3 is above 7.9 with a probability of 0.0084.
-    for (below, cases, word, class) in [
-        (0.2, 1100, "yes", "verdict holds"),
-        (0.001, 20_000, "no", "verdict not"),
-        (0.008, 300, "not decided", "verdict partly"),
-    ] {
-        let text = format!("{RANDOM}[until]\nlimit = \"small\"\nbelow = {below}\n");
-        let bench = bench(&text.replace("cases = 1100", &format!("cases = {cases}")));
-        let said = bench.says(&["campaign", "c.toml"]);
-        let line = format!("P(small broken) < {below} with 95 %: {word}\n");
-        assert!(said.contains(&line), "{said}");
-        let text = bench.text("out/c/report.html");
-        assert!(text.contains(&format!("<span class=\"{class}\">{word}</span>")), "{text}");
-    }
-}
-
-#[test]
 fn a_search_says_whether_the_worst_case_breaks_a_limit() {
     for (bound, breaks) in [("9.0", false), ("7.0", true)] {
         let text = format!("{RANDOM}[search]\nlargest = \"last\"\ncases = 60\n");

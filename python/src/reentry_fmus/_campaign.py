@@ -204,7 +204,6 @@ class Campaign:
     def worst(
         self,
         out: str | os.PathLike[str] | None = None,
-        time: int | None = None,
         jobs: int | None = None,
         *,
         units: Units = "si",
@@ -214,7 +213,6 @@ class Campaign:
         Args:
             out: Folder of the results, by default out/NAME-worst. Those of an earlier search in it
                 are replaced.
-            time: Time after which no further cases are begun, s.
             jobs: Number of threads, by default one for each core.
             units: "deg" gives angles and angular rates of the table in degrees.
 
@@ -225,9 +223,8 @@ class Campaign:
         check_units(units)
         folder = Path("out", f"{self.name}-worst") if out is None else Path(out)
         arguments = ["--worst", "--out", str(folder), "--fresh"]
-        for option, value in (("--time", time), ("--jobs", jobs)):
-            if value is not None:
-                arguments += [option, str(value)]
+        if jobs is not None:
+            arguments += ["--jobs", str(jobs)]
         self.call(*arguments)
         return Search(
             table=read_cases(folder / "search.parquet", units),
@@ -238,15 +235,10 @@ class Campaign:
 
     def _fly(self, law: PickledLaw, folder: Path, jobs: int | None) -> None:
         """Flies the missing parts with a law, and lets the orchestrator merge and judge them."""
-        flown: set[int] = set()
         # The workers share the cores.
         command = [*self.command(), "--out", str(folder.absolute()), "--jobs", "1"]
         with Pool(law, command, jobs) as pool:
-            # A campaign that ends with an answer needs more cases at each look.
-            while missing := missing_parts(self.call, folder):
-                if not flown.isdisjoint(first for first, _ in missing):
-                    raise RuntimeError("the campaign's files were changed while it was flown")
-                flown.update(first for first, _ in missing)
+            if missing := missing_parts(self.call, folder):
                 pool.fly(missing)
             pool.finish()
 
