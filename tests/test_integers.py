@@ -68,7 +68,6 @@ WAYS = {
     "set of a campaign": by_campaign('[set]\n"plant.disturbance.seed" = {number}\n[[vary]]\nparameter = "plant.inertia.scale"\nlist = [1.0]\n'),
     "list": by_campaign(f"{VARY}list = [1, {{number}}]\n"),
     "uniform": by_campaign(f"{VARY}uniform = [{{number}}, 2147483647]\n"),
-    "range": by_campaign(f"{VARY}range = {{{{ from = {{number}}, to = {{number}}, count = 2 }}}}\n"),
     "case": by_campaign(f"{VARY}case = {{number}}\n"),
 }
 
@@ -83,7 +82,7 @@ def test_an_integer_that_fmi_does_not_have_is_refused_with_its_name(way, number,
     assert not list(tmp_path.rglob("*.parquet"))
 
 
-@pytest.mark.parametrize("way", [way for way in WAYS if way not in ("uniform", "range", "case")])
+@pytest.mark.parametrize("way", [way for way in WAYS if way not in ("uniform", "case")])
 def test_the_largest_integer_is_taken(way, tmp_path):
     done = WAYS[way](tmp_path, 2**31 - 1)
     assert done.returncode == 0, done.stderr

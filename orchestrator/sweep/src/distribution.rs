@@ -49,7 +49,7 @@ impl Distribution {
             Shape::List { values, .. } => Ok(values.len() as u64),
             Shape::Whole(ends) => Ok(count(*ends)),
             Shape::Continuous(_) | Shape::Case(_) => {
-                Err("the design levels needs single values: list, range, sign or integers".into())
+                Err("the design levels needs single values: list or integers".into())
             }
         }
     }

@@ -27,20 +27,10 @@ pub struct Vary {
     pub uniform: Option<[Value; 2]>,
     /// Mean and standard deviation of a normal distribution.
     pub normal: Option<Normal>,
-    /// Median and spread of a log-normal distribution.
-    pub log_normal: Option<LogNormal>,
-    /// Smallest, most likely and largest value of a triangular distribution.
-    #[schemars(with = "Option<[cosim::experiment::Scalar; 3]>")]
-    pub triangular: Option<[Value; 3]>,
     /// Values that are equally likely, unless `weights` are given: numbers, texts, items of an
     /// enumeration or truth values.
     #[schemars(with = "Option<Vec<cosim::experiment::Scalar>>")]
     pub list: Option<Vec<Value>>,
-    /// Equally spaced values, equally likely.
-    pub range: Option<Range>,
-    /// Magnitude of a value whose sign is plus or minus.
-    #[schemars(with = "Option<cosim::experiment::Scalar>")]
-    pub sign: Option<Value>,
     /// First of consecutive integers: the parameter is this number plus that of the case, as for
     /// seeds. With another `seed` of the file than 1 they begin elsewhere.
     pub case: Option<i64>,
@@ -55,11 +45,7 @@ pub struct Vary {
 pub(crate) enum Asked<'a> {
     Uniform(&'a [Value; 2]),
     Normal(&'a Normal),
-    LogNormal(&'a LogNormal),
-    Triangular(&'a [Value; 3]),
     List { values: &'a [Value], weights: Option<&'a [f64]> },
-    Range(&'a Range),
-    Sign(&'a Value),
     Case(i64),
 }
 
@@ -79,11 +65,7 @@ impl Vary {
         let keys = [
             ("uniform", self.uniform.as_ref().map(Asked::Uniform)),
             ("normal", self.normal.as_ref().map(Asked::Normal)),
-            ("log_normal", self.log_normal.as_ref().map(Asked::LogNormal)),
-            ("triangular", self.triangular.as_ref().map(Asked::Triangular)),
             ("list", self.list.as_deref().map(list)),
-            ("range", self.range.as_ref().map(Asked::Range)),
-            ("sign", self.sign.as_ref().map(Asked::Sign)),
             ("case", self.case.map(Asked::Case)),
         ];
         let names = keys.each_ref().map(|(name, _)| *name).join(", ");
@@ -133,31 +115,6 @@ pub struct Normal {
     /// Standard deviation of the distribution.
     #[schemars(with = "cosim::experiment::Scalar")]
     pub deviation: Value,
-}
-
-/// A log-normal distribution.
-#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct LogNormal {
-    /// Median of the distribution.
-    #[schemars(with = "cosim::experiment::Scalar")]
-    pub median: Value,
-    /// Standard deviation of the natural logarithm.
-    pub sigma: f64,
-}
-
-/// Equally spaced values.
-#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct Range {
-    /// First value.
-    #[schemars(with = "cosim::experiment::Scalar")]
-    pub from: Value,
-    /// Last value.
-    #[schemars(with = "cosim::experiment::Scalar")]
-    pub to: Value,
-    /// Number of values, at least 2.
-    pub count: u32,
 }
 
 /// Design that places the cases in the space of the varied parameters.

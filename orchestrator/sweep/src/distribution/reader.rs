@@ -1,16 +1,13 @@
 //! Reads the distribution of a parameter, with units converted.
 
 use super::shape::{Seeds, Shape, Whole};
-use crate::vary::{Asked, LogNormal, Normal, Range};
+use crate::vary::{Asked, Normal};
 use cosim::system::System;
 use cosim::variation::{SettingValue, Target};
 use fmi_master::description::VariableKind;
 use statrs::distribution as statrs;
 use std::fmt::Display;
 use toml::Value;
-
-/// Largest number of values of a range.
-const MOST: u32 = 1_000_000;
 
 /// Reads the values of a distribution for one target.
 pub(super) struct Reader<'a> {
@@ -25,27 +22,13 @@ impl Reader<'_> {
         match asked {
             Asked::Uniform(ends) => self.uniform(ends),
             Asked::Normal(normal) => self.normal(normal),
-            Asked::LogNormal(log_normal) => self.log_normal(log_normal),
-            Asked::Triangular(corners) => self.triangular(corners),
             Asked::List { values, weights } => self.list(values, *weights),
-            Asked::Range(range) => self.range(range),
-            Asked::Sign(size) => self.sign(size),
             Asked::Case(first) => self.seeds(*first),
         }
     }
 
     fn kind(&self) -> &VariableKind {
         &self.system.variable(self.target).kind
-    }
-
-    /// Refuses a distribution of real numbers for a parameter of another type.
-    fn check_real(&self, distribution: &str) -> Result<(), String> {
-        match self.kind() {
-            VariableKind::Real { .. } => Ok(()),
-            kind => {
-                Err(format!("{distribution} is for parameters of type Real, not {}", kind.name()))
-            }
-        }
     }
 
     fn uniform(&self, [low, high]: &[Value; 2]) -> Result<Shape, String> {
@@ -72,36 +55,15 @@ impl Reader<'_> {
     }
 
     fn normal(&self, normal: &Normal) -> Result<Shape, String> {
-        self.check_real("normal")?;
+        let kind = self.kind();
+        if !matches!(kind, VariableKind::Real { .. }) {
+            return Err(format!("normal is for parameters of type Real, not {}", kind.name()));
+        }
         let mean = self.number(&normal.mean)?;
         let deviation = self.difference(&normal.deviation)?;
         statrs::Normal::new(mean, deviation)
             .map(|normal| Whole::Normal(normal).into())
             .map_err(|_| format!("normal: deviation = {deviation}, but it must be above 0"))
-    }
-
-    fn log_normal(&self, log_normal: &LogNormal) -> Result<Shape, String> {
-        self.check_real("log_normal")?;
-        let median = self.number(&log_normal.median)?;
-        let sigma = finite(log_normal.sigma)?;
-        if median <= 0.0 {
-            return Err(format!("log_normal: median = {median}, but it must be above 0"));
-        }
-        statrs::LogNormal::new(median.ln(), sigma)
-            .map(|log_normal| Whole::LogNormal(log_normal).into())
-            .map_err(|_| format!("log_normal: sigma = {sigma}, but it must be above 0"))
-    }
-
-    fn triangular(&self, [low, mode, high]: &[Value; 3]) -> Result<Shape, String> {
-        self.check_real("triangular")?;
-        let [low, mode, high] = [self.number(low)?, self.number(mode)?, self.number(high)?];
-        statrs::Triangular::new(low, high, mode)
-            .map(|triangular| Whole::Triangular(triangular).into())
-            .map_err(|_| {
-                format!(
-                    "triangular = [{low}, {mode}, {high}]: the values must be the smallest, the most likely and the largest one"
-                )
-            })
     }
 
     fn list(&self, values: &[Value], weights: Option<&[f64]>) -> Result<Shape, String> {
@@ -114,29 +76,25 @@ impl Reader<'_> {
                 values[twice].to_json()
             ));
         }
-        weighted(values, weights)
-    }
-
-    fn sign(&self, size: &Value) -> Result<Shape, String> {
-        let size = self.number(size)?;
-        if size <= 0.0 {
-            return Err(format!("sign = {size}: it is a magnitude, which must be above 0"));
+        if values.is_empty() {
+            return Err("the list is empty".into());
         }
-        weighted(vec![self.checked(-size)?, self.checked(size)?], None)
-    }
-
-    fn range(&self, range: &Range) -> Result<Shape, String> {
-        if !(2..=MOST).contains(&range.count) {
-            let count = range.count;
-            return Err(format!("range: count = {count}, but it must be from 2 to {MOST}"));
+        let equal = vec![1.0; values.len()];
+        let weights = weights.unwrap_or(&equal);
+        if weights.len() != values.len() {
+            return Err(format!("{} weights for {} values", weights.len(), values.len()));
         }
-        let (from, to) = (self.number(&range.from)?, self.number(&range.to)?);
-        if from >= to {
-            return Err(format!("range: from = {from} must be less than to = {to}"));
+        let sum: f64 = weights.iter().sum();
+        let is_sound = weights.iter().all(|weight| *weight >= 0.0) && sum > 0.0 && sum.is_finite();
+        if !is_sound {
+            return Err("weights must not be negative, and not all zero".into());
         }
-        let last = f64::from(range.count - 1);
-        let value = |i: u32| self.checked(from + (to - from) * f64::from(i) / last);
-        weighted((0..range.count).map(value).collect::<Result<_, _>>()?, None)
+        let mut reached = 0.0;
+        let sums = weights.iter().map(|weight| {
+            reached += weight / sum;
+            reached
+        });
+        Ok(Shape::List { sums: sums.collect(), values })
     }
 
     fn seeds(&self, first: i64) -> Result<Shape, String> {
@@ -223,29 +181,4 @@ fn reversed(low: impl Display, high: impl Display) -> String {
 
 fn finite(number: f64) -> Result<f64, String> {
     if number.is_finite() { Ok(number) } else { Err(format!("{number} is no finite number")) }
-}
-
-/// Makes a list whose values have these weights, or the same weight each.
-fn weighted(values: Vec<SettingValue>, weights: Option<&[f64]>) -> Result<Shape, String> {
-    if values.is_empty() {
-        return Err("the list is empty".into());
-    }
-    let equal = vec![1.0; values.len()];
-    let weights = weights.unwrap_or(&equal);
-    if weights.len() != values.len() {
-        return Err(format!("{} weights for {} values", weights.len(), values.len()));
-    }
-    let sum: f64 = weights.iter().sum();
-    if weights.iter().any(|weight| weight.is_nan() || *weight < 0.0)
-        || sum <= 0.0
-        || sum.is_infinite()
-    {
-        return Err("weights must not be negative, and not all zero".into());
-    }
-    let mut reached = 0.0;
-    let sums = weights.iter().map(|weight| {
-        reached += weight / sum;
-        reached
-    });
-    Ok(Shape::List { sums: sums.collect(), values })
 }

@@ -2,8 +2,8 @@
 
 use crate::texts::shown;
 use cosim::variation::SettingValue;
-use statrs::distribution::{ContinuousCDF, LogNormal, Normal, Triangular, Uniform};
-use statrs::statistics::{Distribution as _, Max, Min, Mode};
+use statrs::distribution::{ContinuousCDF, Normal, Uniform};
+use statrs::statistics::{Distribution as _, Max, Min};
 
 /// Smallest part of a distribution that a truncation may leave, as a share of all up to there.
 const SMALLEST: f64 = 1e-9;
@@ -77,8 +77,6 @@ pub(super) struct Continuous {
 pub(super) enum Whole {
     Uniform(Uniform),
     Normal(Normal),
-    LogNormal(LogNormal),
-    Triangular(Triangular),
 }
 
 impl Whole {
@@ -86,8 +84,6 @@ impl Whole {
         match self {
             Self::Uniform(distribution) => distribution,
             Self::Normal(distribution) => distribution,
-            Self::LogNormal(distribution) => distribution,
-            Self::Triangular(distribution) => distribution,
         }
     }
 
@@ -158,14 +154,6 @@ impl Continuous {
                 let (mean, deviation) = (number(normal.mean()), number(normal.std_dev()));
                 format!("normal, mean {mean}, deviation {deviation}")
             }
-            Whole::LogNormal(log_normal) => {
-                format!("log-normal, median {}", shown(log_normal.inverse_cdf(0.5)))
-            }
-            Whole::Triangular(triangular) => format!(
-                "triangular, {}, most likely {}",
-                ends([triangular.min(), triangular.max()]),
-                number(triangular.mode())
-            ),
         };
         match self.ends {
             Some(bounds) if self.whole.ends() != Some(bounds) => {
