@@ -201,7 +201,7 @@ def test_a_signal_ends_it_and_keeps_what_is_finished(tmp_path):
     command = [program("orchestrator"), "reproduce", EXPERIMENTS, "--out", out, "--fmu-dir", TARGET / "fmu", "--quiet"]
     environment = {**os.environ, "TMPDIR": str(temporary)}
     process = started(command, stderr=subprocess.PIPE, text=True, env=environment)
-    while len(list(out.glob("runs/*/*.parquet"))) < 3:
+    while len(list(out.glob("runs/*/*.part"))) < 3:
         assert process.poll() is None
         time.sleep(0.02)
     # A second process must wait.

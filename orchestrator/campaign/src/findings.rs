@@ -4,11 +4,10 @@ use crate::definition::{Limit, kept_column};
 use crate::flight::CaseStatus;
 use crate::plan::Plan;
 use crate::sensitivity::{Input, Sensitivity, sensitivities};
-use cosim::error::Error;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use sweep::statistics::{CONFIDENCE, Probability, Summary, summary};
-use sweep::table::{Reader, Values};
+use sweep::table::CaseTable;
 
 /// Findings of a campaign, as `summary.json` holds them.
 #[derive(Clone, Debug, Serialize)]
@@ -52,50 +51,49 @@ pub struct Measured {
 }
 
 /// Computes the findings from a table of cases.
-pub(crate) fn findings(plan: &Plan, table: &Reader) -> Result<Findings, Error> {
-    let cases = table.rows();
+pub(crate) fn findings(plan: &Plan, table: &CaseTable) -> Findings {
+    let cases = table.rows() as u64;
     let mut status: BTreeMap<&'static str, u64> =
         CaseStatus::ALL.iter().map(|status| (status.name(), 0)).collect();
-    if let Values::Text(names) = table.column("status")? {
-        for name in names {
-            if let Some(count) = status.get_mut(name.as_str()) {
-                *count += 1;
-            }
+    for name in table.texts("status") {
+        if let Some(count) = status.get_mut(name.as_str()) {
+            *count += 1;
         }
     }
-    let mut limits = Vec::new();
-    for limit in &plan.campaign.limits {
-        let broken = breaking(table, limit)?.len() as u64;
-        limits.push(LimitFinding {
-            id: limit.id.clone(),
-            says: says(plan, limit),
-            broken: Probability::new(broken, cases, CONFIDENCE),
-        });
-    }
-    let inputs = plan.sweep.varied.iter().map(|varied| {
-        let values = table.column(&varied.name)?.numbers();
-        Ok(Input { name: varied.name.clone(), is_seed: varied.is_seed(), values })
+    let limits = plan.campaign.limits.iter().map(|limit| LimitFinding {
+        id: limit.id.clone(),
+        says: says(plan, limit),
+        broken: Probability::new(breaking(table, limit).len() as u64, cases, CONFIDENCE),
     });
-    let inputs = inputs.collect::<Result<Vec<_>, Error>>()?;
-    let mut measures = Vec::new();
-    for recorded in &plan.recorded {
-        let values = table.column(&recorded.name)?.numbers();
-        measures.push(Measured {
+    let inputs = plan.sweep.varied.iter().map(|varied| Input {
+        name: varied.name.clone(),
+        is_seed: varied.is_seed(),
+        values: table.numbers(&varied.name),
+    });
+    let inputs: Vec<Input> = inputs.collect();
+    let measures = plan.recorded.iter().map(|recorded| {
+        let values = table.numbers(&recorded.name);
+        Measured {
             name: recorded.name.clone(),
             words: recorded.words.clone(),
             unit: recorded.unit.clone(),
             summary: summary(&values),
             sensitivities: sensitivities(&inputs, &values),
-        });
+        }
+    });
+    Findings {
+        title: plan.campaign.title.clone(),
+        cases,
+        status,
+        limits: limits.collect(),
+        measures: measures.collect(),
     }
-    Ok(Findings { title: plan.campaign.title.clone(), cases, status, limits, measures })
 }
 
 /// Returns the numbers of the cases that broke a limit.
-pub(crate) fn breaking(table: &Reader, limit: &Limit) -> Result<Vec<u64>, Error> {
-    let kept = table.column(&kept_column(&limit.id))?.numbers();
-    let broke = kept.iter().enumerate().filter(|(_, is_kept)| **is_kept == 0.0);
-    Ok(broke.map(|(case, _)| case as u64).collect())
+pub(crate) fn breaking(table: &CaseTable, limit: &Limit) -> Vec<usize> {
+    let kept = table.numbers(&kept_column(&limit.id)).into_iter().enumerate();
+    kept.filter(|(_, is_kept)| *is_kept == 0.0).map(|(case, _)| case).collect()
 }
 
 /// Returns the wording of a limit.
@@ -114,11 +112,10 @@ fn says(plan: &Plan, limit: &Limit) -> String {
 }
 
 /// Returns the numbers of the cases whose results are to be kept in full.
-pub(crate) fn chosen(plan: &Plan, table: &Reader) -> Result<BTreeSet<u64>, Error> {
+pub(crate) fn chosen(plan: &Plan, table: &CaseTable) -> BTreeSet<u64> {
     let keep = &plan.campaign.keep;
-    let Some(by) = &keep.by else { return Ok(BTreeSet::new()) };
-    let cases = worst(&table.column(by.get_ref())?.numbers(), keep.worst as usize);
-    Ok(cases.into_iter().collect())
+    let Some(by) = &keep.by else { return BTreeSet::new() };
+    worst(&table.numbers(by.get_ref()), keep.worst as usize).into_iter().collect()
 }
 
 /// Returns the numbers of the cases with the largest values, the largest first.

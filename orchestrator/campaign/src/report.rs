@@ -18,7 +18,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use sweep::runner::Options;
 use sweep::statistics::{Probability, Summary};
-use sweep::table::Reader;
+use sweep::table::CaseTable;
 use sweep::texts::{percent, shown};
 use sweep::varied::Varied;
 use sweep::vary::DesignKind;
@@ -29,22 +29,27 @@ const SHOWN: usize = 5;
 /// Writes `report.html`, and the full results of the cases that are kept.
 ///
 /// # Errors
-/// Returns an error if a file cannot be read or written, or if the work was asked to end.
-pub fn write(plan: &Plan, findings: &Findings, out: &Path, options: &Options) -> Result<(), Error> {
-    let cases = Reader::open(&out.join("cases.parquet"))?;
-    let kept_cases = chosen(plan, &cases)?;
+/// Returns an error if a file cannot be written, or if the work was asked to end.
+pub fn write(
+    plan: &Plan,
+    findings: &Findings,
+    cases: &CaseTable,
+    out: &Path,
+    options: &Options,
+) -> Result<(), Error> {
+    let kept_cases = chosen(plan, cases);
     keep(plan, &kept_cases, out, &options.interrupt)?;
     let ranking = ranking(plan);
     let ranked = match &ranking {
-        Some(name) => worst(&cases.column(name)?.numbers(), SHOWN),
+        Some(name) => worst(&cases.numbers(name), SHOWN),
         None => Vec::new(),
     };
-    let histograms = figures::distributions(plan, findings, &cases)?;
+    let histograms = figures::distributions(plan, cases);
     let mut pictures: Vec<Figure> = histograms.into_iter().collect();
-    pictures.extend(figures::scatters(plan, &cases)?);
+    pictures.extend(figures::scatters(plan, cases));
     if let Some(worst) = ranked.first() {
         let (name, values) = (format!("case {worst}"), plan.sweep.values(*worst));
-        pictures.extend(cloud::draw(plan, &name, (*worst, &values), cases.rows(), options)?);
+        pictures.extend(cloud::draw(plan, &name, (*worst, &values), findings.cases, options)?);
     }
     let page = page(plan, findings, &pictures, &kept_cases, ranking.zip(Some(ranked)).as_ref());
     files::write(&out.join("report.html"), page)

@@ -18,7 +18,7 @@ use sweep::error::Error;
 use sweep::flight::can_reset;
 use sweep::parts::{self, PartResult, Store};
 use sweep::runner::{self, Options, Part, Work};
-use sweep::table::{Reader, Values, Writer};
+use sweep::table::CaseTable;
 
 /// Folder of the parts among the results.
 const PARTS: &str = "parts";
@@ -55,9 +55,9 @@ pub fn folder(plan: &Plan, out: Option<&Path>) -> PathBuf {
     out.map_or_else(|| Path::new("out").join(plan.name()), Path::to_path_buf)
 }
 
-fn work<'a>(plan: &'a Plan, out: &'a Path) -> Work<'a, ()> {
+fn work<'a>(plan: &'a Plan, out: &'a Path) -> Work<'a> {
     let store = Store { folder: out.join(PARTS), keys: &plan.sweep.keys };
-    Work::new(&plan.campaign.title, out, vec![store], |_| ())
+    Work::new(&plan.campaign.title, out, vec![store])
 }
 
 /// Returns the parts of a campaign.
@@ -118,17 +118,17 @@ pub fn fly(plan: &Plan, options: &Options) -> Result<CampaignReport, Error> {
     let flown = missing.iter().map(Part::count).sum();
     fly_parts(plan, &missing, options, &mut work)?;
     let path = out.join("cases.parquet");
-    merge(plan, &work)?;
-    let table = Reader::open(&path)?;
-    let findings = findings(plan, &table)?;
+    let mut table = CaseTable::default();
+    for part in all_parts(plan) {
+        table.append(work.stores[0].read(&part.cases)?.rows);
+    }
+    table.write(&path, plan.units())?;
+    let findings = findings(plan, &table);
     let cases = findings.cases;
     if findings.status[CaseStatus::Failed.name()] == cases {
         // Their common cause may lie outside, so none of them is kept.
         fs::remove_dir_all(&parts).map_err(Single::file(&parts))?;
-        let first = match table.column("message")? {
-            Values::Text(messages) => messages.into_iter().next().unwrap_or_default(),
-            _ => String::new(),
-        };
+        let first = table.texts("message").first().map_or("", String::as_str);
         return Err(Error::Failed(format!(
             "all {cases} cases failed, so there are no statistics: {first} ({} has every message, and the same command flies all cases again)",
             path.display()
@@ -136,19 +136,18 @@ pub fn fly(plan: &Plan, options: &Options) -> Result<CampaignReport, Error> {
     }
     check_values(plan, &table)?;
     files::write_json(&out.join("summary.json"), &findings)?;
-    report::write(plan, &findings, &out, options)?;
+    report::write(plan, &findings, &table, &out, options)?;
     let (elapsed, notes) = (begin.elapsed().as_secs_f64(), std::mem::take(&mut work.notes));
     Ok(CampaignReport { findings, out: out.clone(), flown, elapsed, notes })
 }
 
 /// Refuses limits on measures of which no completed case has a value.
-fn check_values(plan: &Plan, table: &Reader) -> Result<(), Error> {
-    let Values::Text(status) = table.column("status")? else { return Ok(()) };
-    let completed: Vec<bool> =
-        status.iter().map(|name| name == CaseStatus::Completed.name()).collect();
+fn check_values(plan: &Plan, table: &CaseTable) -> Result<(), Error> {
+    let status = table.texts("status").iter();
+    let completed: Vec<bool> = status.map(|name| name == CaseStatus::Completed.name()).collect();
     for (limit, place) in plan.limits() {
         let Recorded { name, missing, .. } = &plan.recorded[place];
-        let values = table.column(name)?.numbers();
+        let values = table.numbers(name);
         let is_seen = values.iter().zip(&completed).any(|(value, is)| *is && !value.is_nan());
         if missing.is_none() && !is_seen && completed.contains(&true) {
             return Err(Error::Failed(format!(
@@ -165,7 +164,7 @@ fn fly_parts(
     plan: &Plan,
     missing: &[Part],
     options: &Options,
-    work: &mut Work<()>,
+    work: &mut Work,
 ) -> Result<(), Error> {
     if missing.is_empty() {
         return Ok(());
@@ -187,7 +186,7 @@ fn fly_parts(
                 row
             });
             let rows = table(plan, &rows.collect::<Result<Vec<_>, _>>()?);
-            Ok(PartResult { rows, units: plan.units(), curves: String::new() })
+            Ok(PartResult { rows, curves: String::new() })
         },
         |part, case, error| of_case(case.unwrap_or(part.cases.start), error),
     )
@@ -201,14 +200,4 @@ fn of_case(case: u64, error: Single) -> Error {
         }
         error => error.into(),
     }
-}
-
-/// Merges the parts into one table.
-fn merge(plan: &Plan, work: &Work<()>) -> Result<(), Single> {
-    let path = work.out.join("cases.parquet");
-    let mut writer = Writer::create(&path, &[("units", plan.units())])?;
-    for part in all_parts(plan) {
-        writer.add(work.stores[0].read(&part.cases)?.rows)?;
-    }
-    writer.finish()
 }

@@ -24,7 +24,6 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Instant;
 use sweep::error::Error;
 use sweep::runner::{self, Options};
-use sweep::table::Writer;
 
 /// Step size of a search at its beginning, as a share of the range of each parameter.
 const STEP: f64 = 0.3;
@@ -193,9 +192,7 @@ fn write_tried(
 ) -> Result<(), Error> {
     let rows: Vec<Row> = tried.iter().map(|case| case.row.clone()).collect();
     let path = out.join("search.parquet");
-    let mut writer = Writer::create(&path, &[("units", plan.units())])?;
-    writer.add(table(plan, &rows))?;
-    writer.finish()?;
+    table(plan, &rows).write(&path, plan.units())?;
     if !worst.value.is_nan() {
         return Ok(());
     }

@@ -252,8 +252,7 @@ impl Instances<'_> {
         }
         let curves = serde_json::to_string(&curves);
         let curves = curves.map_err(|error| study.fault(error.to_string()))?;
-        let units = cases.first().map(|flown| sweep.units(flown.metrics.units.iter()));
-        Ok(PartResult { rows: table(sweep, &cases), units: units.unwrap_or_default(), curves })
+        Ok(PartResult { rows: table(sweep, &cases), curves })
     }
 
     /// Returns the time series of the last case, to which the single values of metrics are added.

@@ -16,7 +16,7 @@ use cosim_metrics::folder::Folder;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use sweep::error::Error;
-use sweep::parts::{self, PartResult, Store};
+use sweep::parts::{self, Store};
 use sweep::runner::{self, Options, Part, Work};
 use toml::Spanned;
 
@@ -65,10 +65,9 @@ pub fn reproduce(
         folder: out.join("runs").join(run.id.get_ref()),
         keys: &preparation.sweep.keys,
     });
-    let mut work = Work::new(&study.title, &out, stores.collect(), PartResult::clone);
+    let mut work = Work::new(&study.title, &out, stores.collect());
     let all_parts = all_parts(study);
-    let total = all_parts.len();
-    let missing = if options.fresh { all_parts } else { work.missing(all_parts) };
+    let missing = if options.fresh { all_parts.clone() } else { work.missing(all_parts.clone()) };
     if !missing.is_empty() {
         // An earlier report is removed, because it would not fit the new results if the work is
         // ended early.
@@ -100,8 +99,9 @@ pub fn reproduce(
     }
 
     let mut runs = vec![RunResult::default(); study.runs.len()];
-    for ((run, _), (_, result)) in std::mem::take(&mut work.done) {
-        runs[run].push(result).map_err(|error| study.fault(error.to_string()))?;
+    for Part { sweep, cases } in &all_parts {
+        let result = work.stores[*sweep].read(cases)?;
+        runs[*sweep].push(result).map_err(|error| study.fault(error.to_string()))?;
     }
     let results = Results { study, runs };
     let report = Report::new(&results).map_err(|message| study.fault(message))?;
@@ -110,7 +110,7 @@ pub fn reproduce(
     Ok(StudyReport {
         title: study.title.clone(),
         page: out.join("report.html"),
-        parts: (flown, total - flown),
+        parts: (flown, all_parts.len() - flown),
         runs: results.runs.iter().map(RunResult::cases).sum(),
         elapsed: begin.elapsed().as_secs_f64(),
         notes: std::mem::take(&mut work.notes).into_iter().chain(notes(&results)).collect(),

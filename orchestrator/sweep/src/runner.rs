@@ -11,7 +11,6 @@ use cosim::interrupt::Interrupt;
 use cosim::system::System;
 use cosim_metrics::progress::Parts;
 use fmu_import::isolation::Ended;
-use std::collections::BTreeMap;
 use std::num::NonZero;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -49,51 +48,33 @@ impl Part {
     }
 }
 
-/// Work of which the results are kept in files. `R` is what is remembered of a part.
-pub struct Work<'a, R> {
+/// Work of which the results are kept in files.
+pub struct Work<'a> {
     /// Title of the work, for the progress display.
     pub title: &'a str,
     /// Folder of the results.
     pub out: &'a Path,
     /// Files of the parts, for each sweep.
     pub stores: Vec<Store<'a>>,
-    /// Returns what is remembered of a part.
-    pub remember: Box<dyn Fn(&PartResult) -> R + Sync + 'a>,
-    /// What is remembered of the parts that are there, by the position of the sweep and the first
-    /// case, and their numbers of cases.
-    pub done: BTreeMap<(usize, u64), (u64, R)>,
+    /// Number of cases whose results are there.
+    cases: u64,
     /// Remarks, for example why cases are flown again.
     pub notes: Vec<String>,
 }
 
-impl<'a, R: Send> Work<'a, R> {
+impl<'a> Work<'a> {
     /// Returns work of which nothing is known to be done.
-    pub fn new(
-        title: &'a str,
-        out: &'a Path,
-        stores: Vec<Store<'a>>,
-        remember: impl Fn(&PartResult) -> R + Sync + 'a,
-    ) -> Self {
-        let remember = Box::new(remember);
-        Self { title, out, stores, remember, done: BTreeMap::new(), notes: Vec::new() }
+    pub fn new(title: &'a str, out: &'a Path, stores: Vec<Store<'a>>) -> Self {
+        Self { title, out, stores, cases: 0, notes: Vec::new() }
     }
 
-    /// Returns the number of cases whose results are there.
-    pub fn cases(&self) -> u64 {
-        self.done.values().map(|(cases, _)| cases).sum()
-    }
-
-    /// Looks for those of these parts that are not known to be there, and returns the missing ones.
+    /// Looks for these parts, and returns the missing ones.
     pub fn missing(&mut self, parts: impl IntoIterator<Item = Part>) -> Vec<Part> {
         let mut missing = Vec::new();
         let mut remarks = Remarks::default();
         for part in parts {
-            let place = (part.sweep, part.cases.start);
-            if self.done.contains_key(&place) {
-                continue;
-            }
-            if let Some(found) = remarks.take(self.stores[part.sweep].find(&part.cases)) {
-                self.done.insert(place, (part.count(), (self.remember)(&found)));
+            if remarks.take(self.stores[part.sweep].find(&part.cases)) {
+                self.cases += part.count();
             } else {
                 missing.push(part);
             }
@@ -121,14 +102,11 @@ impl<'a, R: Send> Work<'a, R> {
         if parts.is_empty() {
             return Ok(());
         }
-        let (done, left) = (self.cases(), parts.iter().map(Part::count).sum::<u64>());
+        let (done, left) = (self.cases, parts.iter().map(Part::count).sum::<u64>());
         let progress = Parts::new("cases", self.title, done + left, done, options.quiet);
-        let (stores, remember) = (&self.stores, &self.remember);
-        let keep = |part: &Part, result: PartResult| {
-            let remembered = remember(&result);
-            stores[part.sweep].write(&part.cases, result)?;
-            Ok(remembered)
-        };
+        let stores = &self.stores;
+        let keep =
+            |part: &Part, result: PartResult| Ok(stores[part.sweep].write(&part.cases, &result)?);
         let goes_on = |error: &Error| matches!(error, Error::Case { .. });
         let Worked { results, failures } = if let Some(closing) = closed::closing(systems) {
             progress.draw_here();
@@ -157,10 +135,7 @@ impl<'a, R: Send> Work<'a, R> {
             on_parts(parts, threads, begin, work, goes_on)
         };
         progress.finish();
-        self.done.extend(results.into_iter().map(|(at, remembered)| {
-            let part = &parts[at];
-            ((part.sweep, part.cases.start), (part.count(), remembered))
-        }));
+        self.cases += results.into_keys().map(|at| parts[at].count()).sum::<u64>();
         let (cases, mut others): (Vec<Error>, Vec<Error>) =
             failures.into_values().partition(|error| matches!(error, Error::Case { .. }));
         let more = cases.len().saturating_sub(1);
@@ -168,7 +143,7 @@ impl<'a, R: Send> Work<'a, R> {
         match others.into_iter().next() {
             None => Ok(()),
             Some(Error::Single(Single::Interrupted { request, .. })) => {
-                let (done, out) = (self.cases(), self.out.into());
+                let (done, out) = (self.cases, self.out.into());
                 Err(Error::Unfinished { done, total, out, request })
             }
             Some(Error::Case { case, source, .. }) => Err(Error::Case { case, more, source }),

@@ -1,19 +1,13 @@
-//! Tables of cases as Parquet files: one row for each case, units and items in the metadata.
+//! Tables of cases: one row for each case. They are written as Parquet files, with units in the
+//! metadata.
 
 mod file;
-mod guard;
 
-pub use file::{Reader, Writer};
-
-use cosim::files;
-use parquet::basic::Type as Physical;
-use parquet::column::writer::ColumnWriter;
-use parquet::data_type::ByteArray;
-use parquet::errors::ParquetError;
+use cosim::error::Error;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use sha2::{Digest, Sha256};
 use std::ops::Range;
+use std::path::Path;
 
 /// Values of a column.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -81,7 +75,7 @@ impl Values {
     }
 
     /// Moves the values of another column of the same type behind these.
-    fn append(&mut self, other: Self) -> Result<(), ParquetError> {
+    fn append(&mut self, other: Self) {
         match (self, other) {
             (Self::Real(values), Self::Real(more)) => values.extend(more),
             (Self::Optional(values), Self::Optional(more)) => values.extend(more),
@@ -89,66 +83,7 @@ impl Values {
             (Self::Integer(values), Self::Integer(more)) => values.extend(more),
             (Self::Flag(values), Self::Flag(more)) => values.extend(more),
             (Self::Text(values), Self::Text(more)) => values.extend(more),
-            _ => return Err(ParquetError::General("columns of different types".into())),
-        }
-        Ok(())
-    }
-
-    fn physical(&self) -> Physical {
-        match self {
-            Self::Real(_) | Self::Optional(_) => Physical::DOUBLE,
-            Self::Count(_) => Physical::INT64,
-            Self::Integer(_) => Physical::INT32,
-            Self::Flag(_) => Physical::BOOLEAN,
-            Self::Text(_) => Physical::BYTE_ARRAY,
-        }
-    }
-
-    /// Writes the first `count` values.
-    fn write(&self, count: usize, writer: &mut ColumnWriter) -> Result<usize, ParquetError> {
-        match (self, writer) {
-            (Self::Real(values), ColumnWriter::DoubleColumnWriter(writer)) => {
-                writer.write_batch(&values[..count], None, None)
-            }
-            (Self::Optional(values), ColumnWriter::DoubleColumnWriter(writer)) => {
-                let values = &values[..count];
-                let present: Vec<f64> = values.iter().copied().flatten().collect();
-                let levels: Vec<i16> = values.iter().map(|v| i16::from(v.is_some())).collect();
-                writer.write_batch(&present, Some(&levels), None)
-            }
-            (Self::Count(values), ColumnWriter::Int64ColumnWriter(writer)) => {
-                writer.write_batch(&values[..count], None, None)
-            }
-            (Self::Integer(values), ColumnWriter::Int32ColumnWriter(writer)) => {
-                writer.write_batch(&values[..count], None, None)
-            }
-            (Self::Flag(values), ColumnWriter::BoolColumnWriter(writer)) => {
-                writer.write_batch(&values[..count], None, None)
-            }
-            (Self::Text(values), ColumnWriter::ByteArrayColumnWriter(writer)) => {
-                let bytes = values[..count].iter().map(|text| ByteArray::from(text.as_str()));
-                writer.write_batch(&bytes.collect::<Vec<_>>(), None, None)
-            }
-            _ => Err(ParquetError::General("a column is of another type than its values".into())),
-        }
-    }
-
-    /// Feeds the values to a hash, so that no two columns give the same.
-    fn hash(&self, digest: &mut Sha256) {
-        digest.update((self.len() as u64).to_le_bytes());
-        match self {
-            Self::Real(values) => values.iter().for_each(|v| digest.update(v.to_le_bytes())),
-            Self::Optional(values) => values.iter().for_each(|value| {
-                digest.update([u8::from(value.is_some())]);
-                digest.update(value.unwrap_or(0.0).to_le_bytes());
-            }),
-            Self::Count(values) => values.iter().for_each(|v| digest.update(v.to_le_bytes())),
-            Self::Integer(values) => values.iter().for_each(|v| digest.update(v.to_le_bytes())),
-            Self::Flag(values) => values.iter().for_each(|v| digest.update([u8::from(*v)])),
-            Self::Text(values) => values.iter().for_each(|text| {
-                digest.update((text.len() as u64).to_le_bytes());
-                digest.update(text);
-            }),
+            _ => unreachable!("a column has the same type in all parts"),
         }
     }
 }
@@ -180,38 +115,39 @@ impl CaseTable {
         self.columns.iter().find(|column| column.name == name).map(|column| &column.values)
     }
 
+    /// Returns the numbers of the column with this name, as [`Values::numbers`] does.
+    pub fn numbers(&self, name: &str) -> Vec<f64> {
+        self.column(name).map(Values::numbers).unwrap_or_default()
+    }
+
+    /// Returns the texts of the column with this name; none if it has no texts.
+    pub fn texts(&self, name: &str) -> &[String] {
+        if let Some(Values::Text(texts)) = self.column(name) { texts } else { &[] }
+    }
+
     /// Returns whether the rows are those of these cases, in order.
     pub fn has_cases(&self, cases: &Range<u64>) -> bool {
         let Some(Values::Count(numbers)) = self.column("case") else { return false };
         numbers.iter().map(|number| number.cast_unsigned()).eq(cases.clone())
     }
 
-    /// Returns a hash of names and values, as hexadecimal digits.
-    pub fn digest(&self) -> String {
-        let mut digest = Sha256::new();
-        for column in &self.columns {
-            digest.update((column.name.len() as u64).to_le_bytes());
-            digest.update(&column.name);
-            column.values.hash(&mut digest);
-        }
-        files::hexadecimal(&digest.finalize())
-    }
-
-    fn append(&mut self, other: Self) -> Result<(), ParquetError> {
+    /// Adds the rows of another table, which has the same columns.
+    pub fn append(&mut self, other: Self) {
         if self.columns.is_empty() {
             *self = other;
-            return Ok(());
+            return;
         }
         for (column, more) in self.columns.iter_mut().zip(other.columns) {
-            column.values.append(more.values)?;
+            column.values.append(more.values);
         }
-        Ok(())
     }
 
-    fn remove_first(&mut self, rows: usize) {
-        for column in &mut self.columns {
-            for_any!(&mut column.values, values => drop(values.drain(..rows)));
-        }
+    /// Writes the table as a Parquet file with the units of its columns, which are JSON.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be written.
+    pub fn write(&self, path: &Path, units: String) -> Result<(), Error> {
+        file::write(self, path, units)
     }
 }
 

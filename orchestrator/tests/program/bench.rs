@@ -1,12 +1,13 @@
 //! A folder to run the program in, with an FMU in C that `cc` compiles there.
 
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::record::{Field, Row};
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output};
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
-use sweep::table::{CaseTable, Reader, Values};
 use tempfile::TempDir;
 use zip::write::SimpleFileOptions;
 
@@ -208,16 +209,19 @@ impl Bench {
     /// row, whose cells are separated by commas.
     pub(crate) fn cases(&self, folder: &str) -> Vec<String> {
         let path = self.path(folder).join("cases.parquet");
-        let CaseTable { columns } = Reader::open(&path).unwrap().table().unwrap();
-        let cell = |values: &Values, row: usize| match values {
-            Values::Real(values) => values[row].to_string(),
-            Values::Text(values) => values[row].clone(),
-            Values::Optional(values) => values[row].map(|v| v.to_string()).unwrap_or_default(),
-            values => values.json(row).to_string(),
+        let reader = SerializedFileReader::new(fs::File::open(path).unwrap()).unwrap();
+        let columns = reader.metadata().file_metadata().schema_descr().columns();
+        let heading: Vec<&str> = columns.iter().map(|column| column.name()).collect();
+        let cell = |field: &Field| match field {
+            Field::Null => String::new(),
+            Field::Double(value) => value.to_string(),
+            Field::Str(text) => text.clone(),
+            other => other.to_string(),
         };
-        let heading: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
-        let row = |row| columns.iter().map(|c| cell(&c.values, row)).collect::<Vec<_>>().join(",");
-        let rows = (0..columns[0].values.len()).map(row);
+        let row = |row: Row| {
+            row.get_column_iter().map(|(_, field)| cell(field)).collect::<Vec<_>>().join(",")
+        };
+        let rows = reader.get_row_iter(None).unwrap().map(|read| row(read.unwrap()));
         std::iter::once(heading.join(",")).chain(rows).collect()
     }
 

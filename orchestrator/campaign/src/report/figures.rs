@@ -1,12 +1,11 @@
 //! Histograms and scatter plots of a campaign's cases.
 
-use crate::findings::{Findings, breaking};
+use crate::findings::breaking;
 use crate::plan::Plan;
 use crate::prepare::Recorded;
-use cosim::error::Error;
 use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, with_unit};
 use std::collections::BTreeSet;
-use sweep::table::Reader;
+use sweep::table::CaseTable;
 use sweep::varied::Varied;
 
 const FIRST: Color = Color::CURVES[0];
@@ -32,14 +31,10 @@ fn panel(x_label: &str, y_label: &str, curves: Vec<Curve>) -> Panel {
 }
 
 /// Draws the histogram of each measure that differs from case to case.
-pub(super) fn distributions(
-    plan: &Plan,
-    findings: &Findings,
-    table: &Reader,
-) -> Result<Option<Figure>, Error> {
+pub(super) fn distributions(plan: &Plan, table: &CaseTable) -> Option<Figure> {
     let mut panels = Vec::new();
     for measure in &plan.recorded {
-        let mut values = table.column(&measure.name)?.numbers();
+        let mut values = table.numbers(&measure.name);
         values.retain(|value| value.is_finite());
         values.sort_unstable_by(f64::total_cmp);
         let (Some(low), Some(high)) = (values.first().copied(), values.last().copied()) else {
@@ -56,9 +51,9 @@ pub(super) fn distributions(
         }));
         panels.push(panel(&label(measure), "number of cases", curves));
     }
-    let title = format!("Distributions over {}", super::cases(findings.cases));
+    let title = format!("Distributions over {}", super::cases(table.rows() as u64));
     let columns = COLUMNS.min(panels.len());
-    Ok((columns > 0).then_some(Figure { title, columns, legend: Legend::Above, panels }))
+    (columns > 0).then_some(Figure { title, columns, legend: Legend::Above, panels })
 }
 
 /// Returns the edges of a histogram's bins and the number of values in each; the last edge has no
@@ -76,14 +71,12 @@ fn histogram(sorted: &[f64], low: f64, high: f64) -> (Vec<f64>, Vec<f64>) {
 
 /// Draws measures against the parameters that vary, with the cases marked that broke a limit, were
 /// lost or failed.
-pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error> {
-    let mut bad = BTreeSet::new();
-    for limit in &plan.campaign.limits {
-        bad.extend(breaking(table, limit)?.into_iter().map(|case| case as usize));
-    }
+pub(super) fn scatters(plan: &Plan, table: &CaseTable) -> Vec<Figure> {
+    let limits = plan.campaign.limits.iter();
+    let bad: BTreeSet<usize> = limits.flat_map(|limit| breaking(table, limit)).collect();
     let mut shown: Vec<(&Varied, Vec<f64>)> = Vec::new();
     for varied in plan.sweep.varied.iter().filter(|varied| !varied.is_seed()) {
-        let values = table.column(&varied.name)?.numbers();
+        let values = table.numbers(&varied.name);
         if shown.len() < PARAMETERS && values.iter().any(|value| value.is_finite()) {
             shown.push((varied, values));
         }
@@ -93,10 +86,10 @@ pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error
     };
     let mut measures: Vec<&Recorded> = plan.recorded.iter().filter(limited).collect();
     measures.extend(plan.recorded.iter().filter(|measure| !limited(measure)));
-    let stride = (table.rows() as usize).div_ceil(POINTS).max(1);
+    let stride = table.rows().div_ceil(POINTS).max(1);
     let mut figures = Vec::new();
     for measure in measures.into_iter().take(MEASURES) {
-        let y = table.column(&measure.name)?.numbers();
+        let y = table.numbers(&measure.name);
         let finite = || y.iter().filter(|value| value.is_finite());
         if finite().all(|value| Some(value) == finite().next()) {
             continue;
@@ -121,7 +114,7 @@ pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error
             figures.push(Figure { title, columns, legend: Legend::Above, panels });
         }
     }
-    Ok(figures)
+    figures
 }
 
 #[cfg(test)]
