@@ -36,7 +36,7 @@ pub(crate) struct Sensing {
     )]
     pub(crate) sensor_seed: u64,
     #[setting(name = "sensor")]
-    #[setting(used_with = "sensor.set >= 1 and translation = entry")]
+    #[setting(used_with = "sensor.set >= 1")]
     pub(crate) devices: Devices,
     #[setting(name = "sensor")]
     pub(crate) triads: PerSensor<Triad>,

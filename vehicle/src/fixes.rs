@@ -72,8 +72,10 @@ pub struct StarTracker {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Devices {
     /// Satellite navigation.
+    #[setting(used_with = "translation = entry")]
     pub gnss: Gnss,
     /// Star tracker.
+    #[setting(used_with = "translation = entry")]
     pub star: StarTracker,
     /// Fault of gyroscope and accelerometer with their line: {}
     #[setting(name = "inertial.fault")]

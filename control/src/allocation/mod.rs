@@ -1,5 +1,6 @@
-//! Control allocation: deflections and jets that give the commanded moment. The methods are those
-//! of Wu et al. (2015), section 5, and the selector of Jia et al., section IV.
+//! Control allocation: deflections and jets that give the commanded moment, and the moments that
+//! they can give. The methods are those of Wu et al. (2015), section 5, and the selector of Jia et
+//! al., section IV.
 
 pub mod attainable;
 mod optimum;

@@ -1,6 +1,7 @@
 //! Navigation of an entry flight: strapdown of the inertial sensors, and a Kalman filter that
 //! corrects it by fixes of satellite navigation and star tracker, finds the wind by the side force,
-//! and keeps the altitude by the drag while there are no fixes.
+//! and keeps the altitude by the drag while there are no fixes. Measurements that contradict each
+//! other are refused, and where they contradict the filter, it begins anew.
 //!
 //! The shown state follows the filter's in a smooth way: a correction is blended in over seconds,
 //! so that controllers see an error that drifts instead of one that jumps.

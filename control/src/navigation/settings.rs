@@ -66,8 +66,7 @@ pub struct Errors {
     pub noise: f64,
 }
 
-/// State at the first sample. Position and velocity are those of the first fix of satellite
-/// navigation, if it comes with that sample.
+/// State at the first sample, as it is known before.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Initial {
     /// Motion at the first sample.
@@ -85,11 +84,11 @@ pub struct Alignment {
     #[setting(unit = "rad", above = 0.0, max = 1.0, nominal = 1e-3)]
     #[setting(file)]
     pub attitude: f64,
-    /// Standard deviation of the initial position along each axis, if no fix gives it.
+    /// Standard deviation of the initial position along each axis.
     #[setting(unit = "m", above = 0.0, nominal = 100.0)]
     #[setting(file)]
     pub position: f64,
-    /// Standard deviation of the initial velocity along each axis, if no fix gives it.
+    /// Standard deviation of the initial velocity along each axis.
     #[setting(unit = "m/s", above = 0.0, nominal = 1.0)]
     #[setting(file)]
     pub velocity: f64,

@@ -20,7 +20,7 @@ use vehicle::trajectory::Trajectory;
 /// Number of standard deviations within which errors are protected.
 const PROTECTED: f64 = 3.0;
 
-/// Standard deviations that the filter predicts.
+/// Predicted standard deviations of what is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Deviations {
     /// Predicted standard deviation of the {} relative to the ground velocity.
@@ -97,7 +97,8 @@ pub struct Shown {
     pub deviations: Deviations,
     /// Bounds on the errors.
     pub protection: Protection,
-    /// Square of the normalised innovation per component of the latest {}, 1 on average.
+    /// Square of the normalised innovation per component of the latest {}; that of fixes is 1 on
+    /// average.
     #[setting(name = "innovation", each = SOURCES)]
     pub innovations: [f64; 4],
     /// Estimated bias of the {} about or along {}.

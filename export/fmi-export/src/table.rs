@@ -103,9 +103,11 @@ impl<M> VariableTable<M> {
         self.entries.iter().map(|entry| &entry.variable)
     }
 
-    /// Returns an HTML table of the settings that a file sets; empty if there are none.
+    /// Returns an HTML table of the settings that a file sets; empty if there are none, or if no
+    /// variable names a file.
     pub(crate) fn settings_of_the_file(&self) -> String {
-        if self.of_file.is_empty() {
+        let names_a_file = self.variables().any(|variable| variable.name == "settings.file");
+        if self.of_file.is_empty() || !names_a_file {
             return String::new();
         }
         let row = |Setting { place, kind }: &Setting| {
