@@ -54,7 +54,8 @@ pub struct Deviations {
 /// often errors exceed them, without and with faults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Protection {
-    /// Bound on the error of each angle, relative to the air or to the ground velocity.
+    /// Bound on the errors of the angles that controllers take: angle of attack and sideslip relative
+    /// to the air, and bank angle.
     #[setting(unit = "rad", nominal = 0.01)]
     pub attitude: f64,
     /// Bound on the error of the position.
@@ -194,7 +195,7 @@ impl Navigation {
         if !knows {
             return Protection { attitude: PI, position: self.settings.planet.radius };
         }
-        let deviation = angles.max().max(flow[0]).max(flow[1]);
+        let deviation = angles.z.max(flow[0]).max(flow[1]);
         let hidden = if misalignment > 0.0 { misalignment + deviation } else { 0.0 };
         Protection {
             attitude: (PROTECTED * deviation).max(hidden).min(PI),

@@ -49,7 +49,7 @@ pub(crate) fn draw(
     let worst = (worst.0, worst.1.to_vec(), 1);
     let flights: Vec<_> = std::iter::once(worst).chain(first).collect();
     let title = format!("{}, curves of the report", plan.campaign.title);
-    let progress = Parts::new("cases", &title, flights.len() as u64, 0, options.quiet);
+    let progress = Parts::new("flights", &title, flights.len() as u64, 0, options.quiet);
     let threads = runner::threads(options.jobs, [&plan.sweep]);
     let fly = |(flight, panels): &mut (Flight, Vec<Panel>),
                (case, values, stride): &(u64, Vec<SettingValue>, u64)| {
