@@ -2,6 +2,7 @@
 //! the first.)
 
 mod fmi3;
+mod structure;
 
 pub use fmi3::indices;
 
@@ -13,6 +14,7 @@ use fmi_master::quantity::UnitDefinition;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::str::FromStr;
+use structure::{Known, Positions};
 
 /// Values of `causality` that FMI 2.0, section 2.2.7, allows, and the one that FMI 3.0 adds.
 pub const CAUSALITIES: [&str; 7] = [
@@ -26,31 +28,6 @@ pub const CAUSALITIES: [&str; 7] = [
 ];
 /// Values of `variability` that the same section allows.
 pub const VARIABILITIES: [&str; 5] = ["constant", "fixed", "tunable", "discrete", "continuous"];
-
-/// Flags of an interface in FMI 2.0 and 3.0, in the order in which they are shown.
-const FLAGS: [&str; 21] = [
-    "needsExecutionTool",
-    "canHandleVariableCommunicationStepSize",
-    "canInterpolateInputs",
-    "canRunAsynchronuously",
-    "canBeInstantiatedOnlyOncePerProcess",
-    "canNotUseMemoryManagementFunctions",
-    "canGetAndSetFMUstate",
-    "canSerializeFMUstate",
-    "providesDirectionalDerivative",
-    "completedIntegratorStepNotNeeded",
-    "hasEventMode",
-    "mightReturnEarlyFromDoStep",
-    "canReturnEarlyAfterIntermediateUpdate",
-    "providesIntermediateUpdate",
-    "canGetAndSetFMUState",
-    "canSerializeFMUState",
-    "providesDirectionalDerivatives",
-    "providesAdjointDerivatives",
-    "providesPerElementDependencies",
-    "needsCompletedIntegratorStep",
-    "providesEvaluateDiscreteStates",
-];
 /// Names that the standard gives to the exponents of a base unit.
 const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 
@@ -59,94 +36,24 @@ const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 /// # Errors
 /// Returns a line that says what is wrong with the text, and where.
 pub fn parse(text: &str) -> Result<ModelDescription, String> {
-    let mut variables = Variables::default();
-    let take = |root: &Element, parent: &str, element| variables.take(root, parent, element);
-    let root = Element::parse_with(text, take)?;
-    description(&root, variables)
-}
-
-type Types = BTreeMap<String, Element>;
-
-/// Variables that are taken from the file as it is read, so that their elements need not be stored.
-#[derive(Default)]
-struct Variables {
-    listed: Vec<Variable>,
-    /// Definitions of types by name, once the first variable is read.
-    types: Option<Types>,
-    /// Variables that come before the definition of their type, with their places.
-    early: Vec<(usize, Element)>,
-}
-
-impl Variables {
-    /// Takes an element if it is a variable.
-    fn take(
-        &mut self,
-        root: &Element,
-        parent: &str,
-        element: Element,
-    ) -> Result<Option<Element>, String> {
-        if parent != "ModelVariables" || element.name != "ScalarVariable" {
-            return Ok(Some(element));
-        }
-        if self.types.is_none() {
-            version(root)?;
-        }
-        let types = self.types.get_or_insert_with(|| types(root));
-        let is_early = |kind: &Element| {
-            kind.attribute("declaredType").is_some_and(|name| !types.contains_key(name))
-        };
-        if element.children.iter().any(is_early) {
-            self.early.push((self.listed.len(), element));
-            self.listed.push(Variable::default());
-        } else {
-            self.listed.push(variable(&element, types)?);
-        }
-        Ok(None)
-    }
-
-    /// Returns all variables, in the order of the file.
-    fn finish(mut self, root: &Element) -> Result<Vec<Variable>, String> {
-        if !self.early.is_empty() {
-            let types = types(root);
-            for (place, element) in self.early {
-                self.listed[place] = variable(&element, &types)?;
-            }
-        }
-        Ok(self.listed)
-    }
-}
-
-fn types(root: &Element) -> Types {
-    let types = root.child("TypeDefinitions").into_iter().flat_map(|list| &list.children);
-    types.filter_map(|kind| Some((kind.attribute("name")?.to_string(), kind.clone()))).collect()
-}
-
-/// Returns the version of FMI, which must be one that can be read.
-fn version(root: &Element) -> Result<String, String> {
-    if root.name != "fmiModelDescription" {
-        return Err(format!("is not an FMI description: it begins with {}", root.title()));
-    }
-    let version = root.required("fmiVersion")?.to_string();
-    if version != "2.0" && !version.starts_with("2.0.") && !version.starts_with("3.") {
-        return Err(format!(
-            "is an FMU for FMI {version}, this program runs FMI 2.0 and 3.0: export the model for one of them"
-        ));
-    }
-    Ok(version)
-}
-
-fn description(root: &Element, variables: Variables) -> Result<ModelDescription, String> {
+    let root = &Element::parse(text)?;
     let fmi_version = version(root)?;
     let is_fmi3 = fmi_version.starts_with("3.");
+    let types = types(root);
     let Listed { mut variables, dependencies, derivatives, event_indicators, places, arrays } =
         if is_fmi3 {
-            fmi3::read(root, &types(root))?
+            fmi3::read(root, &types)?
         } else {
-            let variables = variables.finish(root)?;
-            let count = variables.len();
+            let variables = root.list("ModelVariables", "ScalarVariable");
+            let variables: Vec<_> =
+                variables.map(|each| variable(each, &types)).collect::<Result<_, _>>()?;
+            let position = |first: usize| Positions { firsts: vec![first], length: 1 };
+            // An index counts from 1.
+            let positions = (1..).zip((0..variables.len()).map(position)).collect();
+            let known = Known { key: ("index", "index"), positions };
             Listed {
-                dependencies: dependencies(root, count)?,
-                derivatives: derivatives(root, count)?,
+                dependencies: known.dependencies(unknowns(root, "Outputs"))?,
+                derivatives: known.listed(unknowns(root, "Derivatives"))?,
                 event_indicators: root
                     .parsed("numberOfEventIndicators", "a whole number from 0 on")?
                     .unwrap_or(0),
@@ -188,6 +95,28 @@ fn description(root: &Element, variables: Variables) -> Result<ModelDescription,
     })
 }
 
+/// Definitions of types by name.
+type Types<'a> = BTreeMap<&'a str, &'a Element>;
+
+fn types(root: &Element) -> Types<'_> {
+    let types = root.child("TypeDefinitions").into_iter().flat_map(|list| &list.children);
+    types.filter_map(|kind| Some((kind.attribute("name")?, kind))).collect()
+}
+
+/// Returns the version of FMI, which must be one that can be read.
+fn version(root: &Element) -> Result<String, String> {
+    if root.name != "fmiModelDescription" {
+        return Err(format!("is not an FMI description: it begins with {}", root.title()));
+    }
+    let version = root.required("fmiVersion")?.to_string();
+    if version != "2.0" && !version.starts_with("2.0.") && !version.starts_with("3.") {
+        return Err(format!(
+            "is an FMU for FMI {version}, this program runs FMI 2.0 and 3.0: export the model for one of them"
+        ));
+    }
+    Ok(version)
+}
+
 /// Marks the inputs that may stay unconnected, which annotations of the file list.
 fn mark_optional(root: &Element, variables: &mut [Variable]) {
     let tools =
@@ -211,19 +140,9 @@ struct Listed {
 }
 
 fn interface(element: &Element) -> Result<Interface, String> {
-    let mut capabilities = Vec::new();
-    for name in FLAGS {
-        if element.truth(name)? == Some(true) {
-            capabilities.push(name.to_string());
-        }
-    }
-    let order = element.parsed("maxOutputDerivativeOrder", "a whole number from 0 on")?;
-    if let Some(order) = order.filter(|&order: &u32| order > 0) {
-        capabilities.push(format!("maxOutputDerivativeOrder={order}"));
-    }
     Ok(Interface {
         model_identifier: element.required("modelIdentifier")?.to_string(),
-        capabilities,
+        capabilities: element.truths().map(String::from).collect(),
     })
 }
 
@@ -356,50 +275,9 @@ fn named(
     })
 }
 
-/// Returns the position of the variable that an entry of the model structure names.
-fn position_of(unknown: &Element, variables: usize) -> Result<usize, String> {
-    let index = unknown.parsed("index", "a whole number from 1 on")?;
-    let index = index.ok_or_else(|| format!("{} has no attribute index", unknown.title()))?;
-    position(unknown, index, variables)
-}
-
-/// Returns the position of an index of the file, which counts from 1.
-fn position(unknown: &Element, index: usize, variables: usize) -> Result<usize, String> {
-    let position = index.checked_sub(1).filter(|&position| position < variables);
-    position.ok_or_else(|| {
-        format!("{} refers to variable {index}, but there are only {variables}", unknown.title())
-    })
-}
-
 /// Returns the entries of a list of the model structure.
 fn unknowns<'a>(root: &'a Element, list: &'a str) -> impl Iterator<Item = &'a Element> {
     root.child("ModelStructure").into_iter().flat_map(move |it| it.list(list, "Unknown"))
-}
-
-/// Returns the positions of the derivatives, in the order of the continuous states.
-fn derivatives(root: &Element, variables: usize) -> Result<Vec<usize>, String> {
-    unknowns(root, "Derivatives").map(|unknown| position_of(unknown, variables)).collect()
-}
-
-/// Returns the positions of the inputs that each output depends on, by the position of the
-/// output. Only outputs that declare their dependencies have an entry.
-fn dependencies(root: &Element, variables: usize) -> Result<BTreeMap<usize, Vec<usize>>, String> {
-    let mut dependencies = BTreeMap::new();
-    for unknown in unknowns(root, "Outputs") {
-        let position = |index: usize| position(unknown, index, variables);
-        let output = position_of(unknown, variables)?;
-        if let Some(text) = unknown.attribute("dependencies") {
-            let parse = |text: &str| {
-                let fault = || {
-                    format!("\"{}\" in {} is not an index", text.escape_default(), unknown.title())
-                };
-                text.parse().map_err(|_| fault()).and_then(position)
-            };
-            let inputs: Result<Vec<_>, _> = text.split_whitespace().map(parse).collect();
-            dependencies.insert(output, inputs?);
-        }
-    }
-    Ok(dependencies)
 }
 
 #[cfg(test)]

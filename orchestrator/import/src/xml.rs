@@ -63,28 +63,10 @@ impl Element {
     /// # Errors
     /// Returns one line that says what is wrong with the text.
     pub fn parse(text: &str) -> Result<Self, String> {
-        Self::parse_with(text, |_, _, element| Ok(Some(element)))
-    }
-
-    /// Reads an XML document from its text, and offers each element to `take` at its end, with the
-    /// root element as far as it was read and the name of the parent. What `take` returns becomes
-    /// part of the document, so that long lists need not be stored.
-    ///
-    /// # Errors
-    /// Returns one line that says what is wrong with the text, or the error of `take`.
-    pub(crate) fn parse_with(
-        text: &str,
-        mut take: impl FnMut(&Self, &str, Self) -> Result<Option<Self>, String>,
-    ) -> Result<Self, String> {
-        let mut close = |open: &mut Vec<Self>, element: Self| -> Result<(), String> {
-            let child = match (open.get(1), open.last()) {
-                (Some(root), Some(parent)) => take(root, &parent.name, element)?,
-                _ => Some(element),
-            };
-            if let (Some(child), Some(parent)) = (child, open.last_mut()) {
-                parent.children.push(child);
+        let close = |open: &mut Vec<Self>, element: Self| {
+            if let Some(parent) = open.last_mut() {
+                parent.children.push(element);
             }
-            Ok(())
         };
         let mut reader = Reader::from_str(text);
         // Stack of the elements that are open; the first one represents the document itself.
@@ -109,13 +91,13 @@ impl Element {
                 Event::Empty(start) => {
                     let element = Self::read(&start, line).map_err(|error| fault(&error))?;
                     if deeper == 0 {
-                        close(&mut open, element)?;
+                        close(&mut open, element);
                     }
                 }
                 Event::End(_) if deeper > 0 => deeper -= 1,
                 Event::End(_) => {
                     if let Some(closed) = open.pop().filter(|_| !open.is_empty()) {
-                        close(&mut open, closed)?;
+                        close(&mut open, closed);
                     }
                 }
                 // A document type definition could define entities that expand without end.
@@ -226,6 +208,13 @@ impl Element {
             Some("false" | "0") => Ok(Some(false)),
             Some(_) => Err(self.refusal(name, "true or false")),
         }
+    }
+
+    /// Returns the names of the attributes whose value is true.
+    pub fn truths(&self) -> impl Iterator<Item = &str> {
+        let truths =
+            self.attributes.iter().filter(|(_, value)| matches!(value.trim(), "true" | "1"));
+        truths.map(|(name, _)| name.as_str())
     }
 
     /// Returns the attribute with this name as a `T`, if it is present. Messages call a `T` a

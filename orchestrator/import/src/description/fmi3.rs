@@ -1,13 +1,11 @@
 //! Reads the variables of FMI 3.0. The elements of an array become scalar variables, whose names
 //! end in their indices, such as `x[1,2]`; an alias becomes a variable of the same place.
 
+use super::structure::{Known, MOST, Positions};
 use super::{Listed, Types, bound, enumeration, named, real, reference};
 use crate::xml::Element;
 use fmi_master::description::{Array, Place, ScalarType, Variable, VariableKind};
 use std::collections::BTreeMap;
-
-/// Largest number of elements of all arrays of an FMU.
-const MOST: usize = 1_000_000;
 
 /// Types by the names of their elements. An `Enumeration` has the functions of `Int64`.
 const TYPES: [(&str, ScalarType); 15] = [
@@ -27,14 +25,6 @@ const TYPES: [(&str, ScalarType); 15] = [
     ("Clock", ScalarType::Clock),
     ("Enumeration", ScalarType::Int64),
 ];
-
-/// Positions of a variable of the file: those of its first element, and of the first elements of
-/// its aliases, with the number of elements.
-#[derive(Default)]
-struct Positions {
-    firsts: Vec<usize>,
-    length: usize,
-}
 
 /// Reads all variables of a description, with the dependencies of outputs on inputs.
 pub(super) fn read(root: &Element, types: &Types) -> Result<Listed, String> {
@@ -97,14 +87,15 @@ pub(super) fn read(root: &Element, types: &Types) -> Result<Listed, String> {
                 .for_each(|(variable, state)| variable.derivative_of = Some(state));
         }
     }
-    listed.dependencies = dependencies(root, &positions)?;
-    listed.derivatives = structured(root, "ContinuousStateDerivative", &positions)?;
-    listed.event_indicators = structured(root, "EventIndicator", &positions)?.len();
+    let known = Known { key: ("valueReference", "value reference"), positions };
+    listed.dependencies = known.dependencies(entries(root, "Output"))?;
+    listed.derivatives = known.listed(entries(root, "ContinuousStateDerivative"))?;
+    listed.event_indicators = known.listed(entries(root, "EventIndicator"))?.len();
     Ok(listed)
 }
 
 fn variable(element: &Element, scalar: ScalarType, types: &Types) -> Result<Variable, String> {
-    let declared = element.attribute("declaredType").and_then(|name| types.get(name));
+    let declared = element.attribute("declaredType").and_then(|name| types.get(name)).copied();
     let kind = match (element.name.as_str(), scalar) {
         ("Enumeration", _) => enumeration(element, declared)?,
         (_, ScalarType::Float64 | ScalarType::Float32) => real(element, declared)?,
@@ -209,65 +200,4 @@ pub fn indices(number: usize, shape: &[usize]) -> String {
 fn entries<'a>(root: &'a Element, name: &'a str) -> impl Iterator<Item = &'a Element> {
     let all = root.child("ModelStructure").into_iter().flat_map(|list| &list.children);
     all.filter(move |child| child.name == name)
-}
-
-/// Returns the positions of the variable to which an entry of the model structure refers.
-fn find<'a>(
-    entry: &Element,
-    reference: u32,
-    positions: &'a BTreeMap<u32, Positions>,
-) -> Result<&'a Positions, String> {
-    positions.get(&reference).ok_or_else(|| {
-        format!(
-            "{} refers to the value reference {reference}, which no variable has",
-            entry.title()
-        )
-    })
-}
-
-/// Returns the positions of all elements of the variables that the model structure lists under this
-/// name.
-fn structured(
-    root: &Element,
-    name: &str,
-    positions: &BTreeMap<u32, Positions>,
-) -> Result<Vec<usize>, String> {
-    let mut listed = Vec::new();
-    for entry in entries(root, name) {
-        let Positions { firsts, length } = find(entry, reference(entry)?, positions)?;
-        listed.extend(firsts[0]..firsts[0] + length);
-        if listed.len() > MOST {
-            return Err(format!("lists more than {MOST} elements as {name}"));
-        }
-    }
-    Ok(listed)
-}
-
-/// Returns the positions of the variables that each output depends on, by the position of the
-/// output. Elements of an array depend on all elements of others.
-fn dependencies(
-    root: &Element,
-    positions: &BTreeMap<u32, Positions>,
-) -> Result<BTreeMap<usize, Vec<usize>>, String> {
-    let mut dependencies = BTreeMap::new();
-    for output in entries(root, "Output") {
-        let Positions { firsts, length } = find(output, reference(output)?, positions)?;
-        let Some(text) = output.attribute("dependencies") else { continue };
-        let mut needed = Vec::new();
-        for text in text.split_whitespace() {
-            let known = text.parse().map_err(|_| {
-                format!("\"{}\" in {} is no value reference", text.escape_default(), output.title())
-            });
-            let Positions { firsts, length } = find(output, known?, positions)?;
-            needed.extend(firsts[0]..firsts[0] + length);
-        }
-        // Without an entry an output depends on everything.
-        if needed.len().saturating_mul(*length) > MOST {
-            continue;
-        }
-        for first in firsts {
-            dependencies.extend((*first..first + length).map(|output| (output, needed.clone())));
-        }
-    }
-    Ok(dependencies)
 }
