@@ -261,7 +261,7 @@ def test_values_without_a_variable_are_left_out_with_a_warning(tmp_path):
     found, said = parameters(tmp_path, system)
     assert found == {"law": {"delay": 0.1}, "body": {}}
     said = said[: said.index("\n")]
-    assert 'law.delai (did you mean "law.delay"?), lau.delay (did you mean "law.delay"?), other0' in said and said.endswith("and 3 more")
+    assert "law.delai, lau.delay, other0" in said and said.endswith("and 3 more")
 
 
 def test_archives_with_backslashes_are_read(tmp_path):

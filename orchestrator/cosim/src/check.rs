@@ -83,7 +83,14 @@ pub fn check(
         .map(|index| settings::resolve(&experiment, &parts, index, &wires))
         .collect::<Result<Vec<_>, _>>()?;
     let columns = wiring::columns(&experiment, &parts)?;
-    check_size(&experiment, &clock, columns.len())?;
+    if clock.ticks() > MOST_STEPS {
+        let message = format!(
+            "{} steps of {} s are too many, at most {MOST_STEPS} are possible: choose a longer step or an earlier stop",
+            clock.ticks(),
+            clock.step()
+        );
+        return Err(experiment.time_error(&message));
+    }
     if let Some(names) = delay::algebraic_loop(&parts, &wires) {
         let message = format!(
             "algebraic loop: each of these inputs depends on the next at the same instant: {}. \
@@ -211,33 +218,6 @@ fn whereabouts(target: &str, parts: &[Part]) -> String {
 /// Largest number of steps. Beyond it the times of two steps coincide, because FMUs treat instants
 /// as equal if they differ by less than 1e-9 of their size.
 const MOST_STEPS: u64 = 1_000_000_000;
-/// Approximate size of a number in `results.csv`, bytes.
-const NUMBER: f64 = 20.0;
-/// Lower bound of the computing time of a step of two small FMUs, s.
-const QUICK: f64 = 1e-5;
-
-/// Rejects experiments that no machine can run, and warns of results that fill a disk.
-fn check_size(experiment: &Experiment, clock: &Clock, columns: usize) -> Result<(), Error> {
-    let steps = clock.ticks();
-    let rows = steps as f64 / f64::from(experiment.record.every);
-    let gigabytes = rows * (columns + 1) as f64 * NUMBER / 1e9;
-    if steps > MOST_STEPS {
-        let message = format!(
-            "{steps} steps of {} s are too many, at most {MOST_STEPS} are possible. results.csv would take \
-             about {gigabytes:.0} GB and the run {:.0} h or more: choose a longer step or an earlier stop",
-            clock.step(),
-            steps as f64 * QUICK / 3600.0
-        );
-        return Err(experiment.time_error(&message));
-    }
-    if gigabytes > 10.0 {
-        tracing::warn!(
-            "results.csv will take about {gigabytes:.0} GB: with [record] every = n only every n-th communication point is written"
-        );
-    }
-    Ok(())
-}
-
 /// Checks that an FMU that can be instantiated only once per process is used by one component only.
 fn check_single_instances(
     experiment: &Experiment,

@@ -73,7 +73,7 @@ impl FmuInstance {
         // SAFETY: FMI 2.0 gives the function this type; the texts outlive the call, and the
         // instance keeps callbacks and log alive as long as the instance, as FMI demands.
         let handle = foreign(&log, "instantiate", || unsafe {
-            (functions.instantiate)(
+            (functions.own.instantiate)(
                 name.as_ptr(),
                 kind,
                 guid.as_ptr(),
@@ -115,7 +115,7 @@ macro_rules! call_with_values {
         assert_eq!($references.len(), $values.len(), "as many values as references");
         // SAFETY: the instance is alive, and both arrays have the length that is passed.
         $self.call($name, |functions, handle| unsafe {
-            (functions.$function)(handle, $references.as_ptr(), $references.len(), $pointer)
+            (functions.own.$function)(handle, $references.as_ptr(), $references.len(), $pointer)
         })
     }};
 }
@@ -158,9 +158,9 @@ impl Instance for FmuInstance {
         let tolerance = self.tolerance.unwrap_or(0.0);
         // SAFETY: the instance is alive, and the function has the type FMI gives it.
         self.call("setupExperiment", |functions, handle| unsafe {
-            (functions.setup_experiment)(handle, is_told, tolerance, start, fmi::TRUE, stop)
+            (functions.own.setup_experiment)(handle, is_told, tolerance, start, fmi::TRUE, stop)
         })?;
-        self.call_plain("enterInitializationMode", self.functions().enter_initialization_mode)
+        self.call_plain("enterInitializationMode", self.functions().own.enter_initialization_mode)
     }
 
     fn exit_initialization(&mut self) -> Outcome {

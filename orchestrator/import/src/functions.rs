@@ -8,37 +8,79 @@ use libloading::Library;
 use std::ffi::{CStr, CString, c_int};
 use std::path::Path;
 
+/// Declares functions, each with its type and with its name in all versions of FMI, or in FMI 2 and
+/// FMI 3.
+macro_rules! functions {
+    ($(#[$doc:meta])* $name:ident { $($field:ident: $type:ty = $symbol:literal $(/ $later:literal)?,)+ }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy)]
+        pub(crate) struct $name {
+            $(pub(crate) $field: $type,)+
+        }
+
+        impl $name {
+            /// Returns the functions of a library.
+            ///
+            /// # Safety
+            /// They must not be called after the library was closed.
+            pub(crate) unsafe fn load(
+                symbols: &$crate::functions::Symbols,
+            ) -> Result<Self, libloading::Error> {
+                // SAFETY: FMI gives each function the type it is loaded as.
+                unsafe { Ok(Self { $($field: symbols.named(&[$symbol $(, $later)?])?,)+ }) }
+            }
+        }
+    };
+}
+pub(crate) use functions;
+
 /// The functions of FMI 2.0 that this program calls.
 pub(crate) struct Functions {
-    pub(crate) instantiate: fmi::Instantiate,
-    pub(crate) setup_experiment: fmi::SetupExperiment,
-    pub(crate) enter_initialization_mode: fmi::Plain,
-    pub(crate) get_real: fmi::Get<f64>,
-    pub(crate) get_integer: fmi::Get<i32>,
-    pub(crate) get_boolean: fmi::Get<i32>,
-    pub(crate) set_real: fmi::Set<f64>,
-    pub(crate) set_integer: fmi::Set<i32>,
-    pub(crate) set_boolean: fmi::Set<i32>,
-    pub(crate) set_string: fmi::Set<fmi::Text>,
+    pub(crate) own: OwnFunctions,
     /// Optional, because FMI asks for it only if the description declares it.
     pub(crate) directional_derivative: Option<fmi::DirectionalDerivative>,
     pub(crate) interface: InterfaceFunctions,
     common: Common,
 }
 
+functions! {
+    /// The functions of FMI 2.0 that every library has, beside those of all versions.
+    OwnFunctions {
+        instantiate: fmi::Instantiate = "Instantiate",
+        setup_experiment: fmi::SetupExperiment = "SetupExperiment",
+        enter_initialization_mode: fmi::Plain = "EnterInitializationMode",
+        get_real: fmi::Get<f64> = "GetReal",
+        get_integer: fmi::Get<i32> = "GetInteger",
+        get_boolean: fmi::Get<i32> = "GetBoolean",
+        set_real: fmi::Set<f64> = "SetReal",
+        set_integer: fmi::Set<i32> = "SetInteger",
+        set_boolean: fmi::Set<i32> = "SetBoolean",
+        set_string: fmi::Set<fmi::Text> = "SetString",
+    }
+}
+
 /// The functions of the interface for which a library is loaded. It may lack those of the other.
 #[derive(Clone, Copy)]
 pub(crate) enum InterfaceFunctions {
     CoSimulation(StepFunctions),
-    ModelExchange { new_discrete_states: fmi::NewDiscreteStates, completed: fmi::CompletedStep },
+    ModelExchange(EventFunctions),
 }
 
-/// The functions of co-simulation.
-#[derive(Clone, Copy)]
-pub(crate) struct StepFunctions {
-    pub(crate) do_step: fmi::DoStep,
-    pub(crate) get_real_status: fmi::GetStatus<f64>,
-    pub(crate) get_boolean_status: fmi::GetStatus<c_int>,
+functions! {
+    /// The functions of co-simulation.
+    StepFunctions {
+        do_step: fmi::DoStep = "DoStep",
+        get_real_status: fmi::GetStatus<f64> = "GetRealStatus",
+        get_boolean_status: fmi::GetStatus<c_int> = "GetBooleanStatus",
+    }
+}
+
+functions! {
+    /// The functions of model exchange with types of FMI 2.0.
+    EventFunctions {
+        new_discrete_states: fmi::NewDiscreteStates = "NewDiscreteStates",
+        completed: fmi::CompletedStep = "CompletedIntegratorStep",
+    }
 }
 
 /// The functions that have the same types in all versions of FMI, and the library that holds them.
@@ -57,25 +99,27 @@ pub(crate) struct Common {
     symbols: Symbols,
 }
 
-/// The functions of model exchange that have the same types in all versions of FMI.
-#[derive(Clone, Copy)]
-pub(crate) struct ExchangeFunctions {
-    pub(crate) set_time: fmi::SetTime,
-    pub(crate) set_states: fmi::SetVector,
-    pub(crate) get_states: fmi::GetVector,
-    pub(crate) get_nominals: fmi::GetVector,
-    pub(crate) get_derivatives: fmi::GetVector,
-    pub(crate) get_indicators: fmi::GetVector,
-    pub(crate) enter_event_mode: fmi::Plain,
-    pub(crate) enter_continuous_time_mode: fmi::Plain,
+functions! {
+    /// The functions of model exchange that have the same types in all versions of FMI.
+    ExchangeFunctions {
+        set_time: fmi::SetTime = "SetTime",
+        set_states: fmi::SetVector = "SetContinuousStates",
+        get_states: fmi::GetVector = "GetContinuousStates",
+        get_nominals: fmi::GetVector = "GetNominalsOfContinuousStates",
+        get_derivatives: fmi::GetVector = "GetDerivatives" / "GetContinuousStateDerivatives",
+        get_indicators: fmi::GetVector = "GetEventIndicators",
+        enter_event_mode: fmi::Plain = "EnterEventMode",
+        enter_continuous_time_mode: fmi::Plain = "EnterContinuousTimeMode",
+    }
 }
 
-/// The functions by which an instance keeps its states.
-#[derive(Clone, Copy)]
-pub(crate) struct StateFunctions {
-    pub(crate) get: fmi::StateInPlace,
-    pub(crate) set: fmi::SetState,
-    pub(crate) free: fmi::StateInPlace,
+functions! {
+    /// The functions by which an instance keeps its states.
+    StateFunctions {
+        get: fmi::StateInPlace = "GetFMUstate" / "GetFMUState",
+        set: fmi::SetState = "SetFMUstate" / "SetFMUState",
+        free: fmi::StateInPlace = "FreeFMUstate" / "FreeFMUState",
+    }
 }
 
 /// A library, whose functions begin with the version of FMI.
@@ -91,6 +135,16 @@ impl Symbols {
         // is. Whoever runs an FMU trusts its code. Some leave flushing to zero behind, as those of
         // gcc's option -ffast-math do.
         in_default(|| unsafe { Library::new(file) }).map(|library| Self { library, version })
+    }
+
+    /// Returns a function by its names in FMI 2 and FMI 3, if they differ.
+    ///
+    /// # Safety
+    /// As for [`Self::get`].
+    pub(crate) unsafe fn named<T: Copy>(&self, names: &[&str]) -> Result<T, libloading::Error> {
+        let place = usize::from(self.version > 2).min(names.len() - 1);
+        // SAFETY: as above.
+        unsafe { self.get(names[place]) }
     }
 
     /// Returns a function by its name without `fmi2` or `fmi3`.
@@ -115,7 +169,7 @@ impl Common {
                 exit_initialization_mode: symbols.get("ExitInitializationMode")?,
                 terminate: symbols.get("Terminate")?,
                 reset: symbols.get("Reset").ok(),
-                states: StateFunctions::load(&symbols),
+                states: StateFunctions::load(&symbols).ok(),
                 exchange: exchanges.then(|| ExchangeFunctions::load(&symbols)).transpose()?,
                 get_version: symbols.get("GetVersion").ok(),
                 symbols,
@@ -137,47 +191,6 @@ impl Common {
         (!is_supported).then(|| {
             format!("its library reports version \"{}\" of FMI", reported.escape_default())
         })
-    }
-}
-
-impl ExchangeFunctions {
-    /// Returns the functions of a library.
-    ///
-    /// # Safety
-    /// They must not be called after the library was closed.
-    unsafe fn load(symbols: &Symbols) -> Result<Self, libloading::Error> {
-        let derivatives = ["GetDerivatives", "GetContinuousStateDerivatives"];
-        // SAFETY: FMI gives each function the type it is loaded as.
-        unsafe {
-            Ok(Self {
-                set_time: symbols.get("SetTime")?,
-                set_states: symbols.get("SetContinuousStates")?,
-                get_states: symbols.get("GetContinuousStates")?,
-                get_nominals: symbols.get("GetNominalsOfContinuousStates")?,
-                get_derivatives: symbols.get(derivatives[usize::from(symbols.version > 2)])?,
-                get_indicators: symbols.get("GetEventIndicators")?,
-                enter_event_mode: symbols.get("EnterEventMode")?,
-                enter_continuous_time_mode: symbols.get("EnterContinuousTimeMode")?,
-            })
-        }
-    }
-}
-
-impl StateFunctions {
-    /// Returns the functions of a library, if it has all of them.
-    ///
-    /// # Safety
-    /// They must not be called after the library was closed.
-    unsafe fn load(symbols: &Symbols) -> Option<Self> {
-        let state = if symbols.version == 2 { "FMUstate" } else { "FMUState" };
-        // SAFETY: FMI gives each function the type it is loaded as.
-        unsafe {
-            Some(Self {
-                get: symbols.get(&format!("Get{state}")).ok()?,
-                set: symbols.get(&format!("Set{state}")).ok()?,
-                free: symbols.get(&format!("Free{state}")).ok()?,
-            })
-        }
     }
 }
 
@@ -243,12 +256,12 @@ impl Table for Functions {
     }
 
     unsafe fn update(&self, handle: fmi::Handle) -> (EventInfo, c_int) {
-        let InterfaceFunctions::ModelExchange { new_discrete_states, .. } = self.interface else {
+        let InterfaceFunctions::ModelExchange(functions) = self.interface else {
             return (EventInfo::default(), NOT_OFFERED);
         };
         let mut info = fmi::EventInfo::default();
         // SAFETY: FMI gives the function this type, and the structure is valid for the call.
-        let status = unsafe { new_discrete_states(handle, &raw mut info) };
+        let status = unsafe { (functions.new_discrete_states)(handle, &raw mut info) };
         let is_true = |value| value != fmi::FALSE;
         let info = EventInfo {
             needs_another: is_true(info.new_discrete_states_needed),
@@ -261,12 +274,13 @@ impl Table for Functions {
     }
 
     unsafe fn complete_step(&self, handle: fmi::Handle) -> (Completed, c_int) {
-        let InterfaceFunctions::ModelExchange { completed, .. } = self.interface else {
+        let InterfaceFunctions::ModelExchange(functions) = self.interface else {
             return (Completed::default(), NOT_OFFERED);
         };
         let (mut event, mut ends) = (fmi::FALSE, fmi::FALSE);
         // SAFETY: FMI gives the function this type, and both pointers are valid for the call.
-        let status = unsafe { completed(handle, fmi::TRUE, &raw mut event, &raw mut ends) };
+        let status =
+            unsafe { (functions.completed)(handle, fmi::TRUE, &raw mut event, &raw mut ends) };
         let [enters_event_mode, terminates] = [event, ends].map(|value| value != fmi::FALSE);
         (Completed { enters_event_mode, terminates }, status)
     }
@@ -280,28 +294,12 @@ impl Functions {
         // loaded as long as the pointers exist.
         unsafe {
             let interface = if exchanges {
-                InterfaceFunctions::ModelExchange {
-                    new_discrete_states: symbols.get("NewDiscreteStates")?,
-                    completed: symbols.get("CompletedIntegratorStep")?,
-                }
+                InterfaceFunctions::ModelExchange(EventFunctions::load(&symbols)?)
             } else {
-                InterfaceFunctions::CoSimulation(StepFunctions {
-                    do_step: symbols.get("DoStep")?,
-                    get_real_status: symbols.get("GetRealStatus")?,
-                    get_boolean_status: symbols.get("GetBooleanStatus")?,
-                })
+                InterfaceFunctions::CoSimulation(StepFunctions::load(&symbols)?)
             };
             Ok(Self {
-                instantiate: symbols.get("Instantiate")?,
-                setup_experiment: symbols.get("SetupExperiment")?,
-                enter_initialization_mode: symbols.get("EnterInitializationMode")?,
-                get_real: symbols.get("GetReal")?,
-                get_integer: symbols.get("GetInteger")?,
-                get_boolean: symbols.get("GetBoolean")?,
-                set_real: symbols.get("SetReal")?,
-                set_integer: symbols.get("SetInteger")?,
-                set_boolean: symbols.get("SetBoolean")?,
-                set_string: symbols.get("SetString")?,
+                own: OwnFunctions::load(&symbols)?,
                 directional_derivative: symbols.get("GetDirectionalDerivative").ok(),
                 interface,
                 common: Common::load(symbols, exchanges)?,

@@ -2,7 +2,7 @@
 
 use cosim::error::Error;
 use cosim::run::{Observer, Sample};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressState, ProgressStyle};
 use std::fmt::Arguments;
 use std::io::{IsTerminal, Write, stderr};
 use std::sync::{Mutex, PoisonError};
@@ -19,16 +19,13 @@ fn bar(length: u64, quiet: bool, template: &str) -> ProgressBar {
     let target =
         if shown { ProgressDrawTarget::stderr_with_hz(10) } else { ProgressDrawTarget::hidden() };
     let bar = ProgressBar::with_draw_target(Some(length), target);
+    let bar = bar.with_finish(ProgressFinish::AndClear);
     if let Ok(style) = ProgressStyle::with_template(template) {
         // Writing to the line of the bar cannot fail.
         let speed = |state: &ProgressState, line: &mut dyn std::fmt::Write| {
             let _ = line.write_str(&rate(state.per_sec()));
         };
-        let left = |state: &ProgressState, line: &mut dyn std::fmt::Write| {
-            let _ = write!(line, "{} left", duration(state.eta()));
-        };
-        let style = style.with_key("rate", speed).with_key("left", left);
-        bar.set_style(style.progress_chars("=> "));
+        bar.set_style(style.with_key("rate", speed).progress_chars("=> "));
     }
     bar
 }
@@ -37,16 +34,6 @@ fn bar(length: u64, quiet: bool, template: &str) -> ProgressBar {
 fn rate(per_second: f64) -> String {
     let digits = usize::from(per_second < 9.95);
     format!("{per_second:.digits$} per second")
-}
-
-/// Formats a time to wait in its two largest units.
-fn duration(time: Duration) -> String {
-    let seconds = time.as_secs();
-    match (seconds / 3600, seconds / 60 % 60, seconds % 60) {
-        (0, 0, seconds) => format!("{seconds} s"),
-        (0, minutes, seconds) => format!("{minutes} min {seconds} s"),
-        (hours, minutes, _) => format!("{hours} h {minutes} min"),
-    }
 }
 
 /// A progress bar of a run, which is redrawn a few times a second.
@@ -63,7 +50,7 @@ impl Progress {
         if !stderr().is_terminal() && !quiet {
             tell(format_args!("running {title}: {ticks} steps"));
         }
-        let bar = bar(ticks, quiet, "[{bar:30}] {percent} %, {left} {wide_msg}");
+        let bar = bar(ticks, quiet, "[{bar:30}] {percent} %, {eta} left {wide_msg}");
         bar.set_message(title.to_string());
         if apart {
             bar.enable_steady_tick(Duration::from_millis(100));
@@ -81,12 +68,6 @@ impl Observer for Progress {
             self.bar.finish_and_clear();
         }
         Ok(())
-    }
-}
-
-impl Drop for Progress {
-    fn drop(&mut self) {
-        self.bar.finish_and_clear();
     }
 }
 
@@ -112,7 +93,7 @@ impl Parts {
             tell(format_args!("{title}: {} of {total} {what} to run", total - done));
         }
         let template =
-            format!("[{{bar:20}}] {{pos}} of {{len}} {what}, {{rate}}, {{left}}{{wide_msg}}");
+            format!("[{{bar:20}}] {{pos}} of {{len}} {what}, {{rate}}, {{eta}} left{{wide_msg}}");
         let bar = bar(total, quiet, &template);
         bar.set_position(done);
         bar.reset_eta();
@@ -153,23 +134,14 @@ impl Parts {
     }
 }
 
-impl Drop for Parts {
-    fn drop(&mut self) {
-        self.bar.finish_and_clear();
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn rates_and_times_have_units_and_no_more_digits_than_matter() {
+    fn rates_have_units_and_no_more_digits_than_matter() {
         let rates = [64.3074, 9.9499, 9.951, 0.25, 0.0].map(rate);
         let expected = ["64", "9.9", "10", "0.2", "0.0"].map(|text| format!("{text} per second"));
         assert_eq!(rates, expected);
-        let times = [10.4, 59.0, 60.0, 125.0, 3600.0, 7384.0];
-        let times = times.map(|seconds| duration(Duration::from_secs_f64(seconds)));
-        assert_eq!(times, ["10 s", "59 s", "1 min 0 s", "2 min 5 s", "1 h 0 min", "2 h 3 min"]);
     }
 }

@@ -193,13 +193,13 @@ fn two_processes_do_not_share_a_folder() {
 }
 
 #[test]
-fn steps_without_number_are_refused_with_what_they_would_take() {
+fn steps_without_number_are_refused() {
     let bench = Bench::new();
     for (arguments, steps) in
         [(["--step", "1e-9"], "3000000000 steps"), (["--stop", "1e12"], "1000000000000 steps")]
     {
         let message = bench.refusal(&arguments);
-        assert!(message.contains(steps) && message.contains(" GB and the run "), "{message}");
+        assert!(message.contains(steps) && message.contains("too many"), "{message}");
         assert!(!bench.path("out").exists());
     }
 }

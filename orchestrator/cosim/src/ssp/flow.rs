@@ -6,7 +6,6 @@ use super::structure::{Connector, Link, Node, Structure};
 use super::value::{Passage, Quantity, Unit};
 use crate::experiment::Connection;
 use fmi_master::description::{Variable, VariableKind};
-use fmi_master::names;
 use fmi_master::quantity::Scaling;
 use fmi_master::wiring::Part;
 use fmu_import::description::indices;
@@ -183,11 +182,8 @@ impl<'a> Flow<'a> {
         for given in &self.structure.values {
             let nodes = self.targets(given);
             if nodes.is_empty() {
-                let names = left_out.entry(&given.file).or_default();
-                let near = if names.len() < LISTED { self.nearest(given) } else { None };
-                let near = near.map(|near| format!(" (did you mean \"{near}\"?)"));
                 let name = dotted(&(given.owner.clone(), given.name.clone()));
-                names.push(format!("{name}{}", near.unwrap_or_default()));
+                left_out.entry(&given.file).or_default().push(name);
             }
             for node in nodes {
                 let quantity = given
@@ -232,20 +228,6 @@ impl<'a> Flow<'a> {
     fn of_systems(&self) -> impl Iterator<Item = &'a Node> {
         let structure = self.structure;
         structure.connectors.keys().filter(|node| structure.component_of(node).is_none())
-    }
-
-    fn nearest(&self, given: &Given) -> Option<String> {
-        let own = self.parts.iter().find(|part| part.name == given.owner);
-        let parts = own.map_or(self.parts, std::slice::from_ref);
-        let all = parts.iter().flat_map(|part| {
-            let kinds = ["parameter", "input"].into_iter();
-            let variables = kinds.flat_map(|kind| part.description.names(kind));
-            variables.map(|name| dotted(&(part.name.to_string(), name.to_string())))
-        });
-        let connectors = self.of_systems().filter(|_| own.is_none()).map(dotted);
-        let all: Vec<String> = all.chain(connectors).collect();
-        let wrong = dotted(&(given.owner.clone(), given.name.clone()));
-        names::nearest(&wrong, all.iter().map(String::as_str)).map(String::from)
     }
 
     /// Returns the way of a value against its direction: from the variable where it ends to the

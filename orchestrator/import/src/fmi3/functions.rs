@@ -3,7 +3,7 @@
 #![allow(unsafe_code)]
 
 use crate::fmi::{self, Handle, Text};
-use crate::functions::{Common, Completed, EventInfo, NOT_OFFERED, Symbols, Table};
+use crate::functions::{Common, Completed, EventInfo, NOT_OFFERED, Symbols, Table, functions};
 use fmi_master::description::ScalarType;
 use std::ffi::{c_int, c_void};
 use std::path::Path;
@@ -100,16 +100,25 @@ pub(crate) struct Functions {
 #[derive(Clone, Copy)]
 pub(super) enum InterfaceFunctions {
     CoSimulation(StepFunctions),
-    ModelExchange { instantiate: InstantiateModelExchange, completed: CompletedStep },
+    ModelExchange(EventFunctions),
 }
 
-/// The functions of co-simulation.
-#[derive(Clone, Copy)]
-pub(super) struct StepFunctions {
-    pub(super) instantiate: InstantiateCoSimulation,
-    pub(super) enter_event_mode: fmi::Plain,
-    pub(super) enter_step_mode: fmi::Plain,
-    pub(super) do_step: DoStep,
+functions! {
+    /// The functions of co-simulation.
+    StepFunctions {
+        instantiate: InstantiateCoSimulation = "InstantiateCoSimulation",
+        enter_event_mode: fmi::Plain = "EnterEventMode",
+        enter_step_mode: fmi::Plain = "EnterStepMode",
+        do_step: DoStep = "DoStep",
+    }
+}
+
+functions! {
+    /// The functions of model exchange with types of FMI 3.0.
+    EventFunctions {
+        instantiate: InstantiateModelExchange = "InstantiateModelExchange",
+        completed: CompletedStep = "CompletedIntegratorStep",
+    }
 }
 
 /// Functions that get and set values of a type, and the names of the calls in failures.
@@ -141,17 +150,9 @@ impl Functions {
         // exist.
         unsafe {
             let interface = if exchanges {
-                InterfaceFunctions::ModelExchange {
-                    instantiate: symbols.get("InstantiateModelExchange")?,
-                    completed: symbols.get("CompletedIntegratorStep")?,
-                }
+                InterfaceFunctions::ModelExchange(EventFunctions::load(&symbols)?)
             } else {
-                InterfaceFunctions::CoSimulation(StepFunctions {
-                    instantiate: symbols.get("InstantiateCoSimulation")?,
-                    enter_event_mode: symbols.get("EnterEventMode")?,
-                    enter_step_mode: symbols.get("EnterStepMode")?,
-                    do_step: symbols.get("DoStep")?,
-                })
+                InterfaceFunctions::CoSimulation(StepFunctions::load(&symbols)?)
             };
             Ok(Self {
                 enter_initialization_mode: symbols.get("EnterInitializationMode")?,
@@ -201,12 +202,12 @@ impl Table for Functions {
     }
 
     unsafe fn complete_step(&self, handle: Handle) -> (Completed, c_int) {
-        let InterfaceFunctions::ModelExchange { completed, .. } = self.interface else {
+        let InterfaceFunctions::ModelExchange(functions) = self.interface else {
             return (Completed::default(), NOT_OFFERED);
         };
         let [mut enters, mut ends] = [Truth::MIN; 2];
         // SAFETY: FMI gives the function this type, and both pointers are valid for the call.
-        let status = unsafe { completed(handle, true, &raw mut enters, &raw mut ends) };
+        let status = unsafe { (functions.completed)(handle, true, &raw mut enters, &raw mut ends) };
         (Completed { enters_event_mode: enters != 0, terminates: ends != 0 }, status)
     }
 }

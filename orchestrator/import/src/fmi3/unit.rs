@@ -41,9 +41,15 @@ impl Fmi3Unit {
         // is kept alive as long as the instance.
         let handle = foreign(&log, "instantiate", || unsafe {
             match functions.interface {
-                InterfaceFunctions::ModelExchange { instantiate, .. } => {
-                    instantiate(name, token, resources, false, true, environment, logs::receive)
-                }
+                InterfaceFunctions::ModelExchange(functions) => (functions.instantiate)(
+                    name,
+                    token,
+                    resources,
+                    false,
+                    true,
+                    environment,
+                    logs::receive,
+                ),
                 InterfaceFunctions::CoSimulation(functions) => (functions.instantiate)(
                     name,
                     token,
