@@ -29,7 +29,7 @@ use fmu_import::isolation::Messages;
 use fmu_import::law::{self, Printed};
 use plain::{Plain, plain};
 use serde_json::json;
-use std::io::{BufWriter, IsTerminal, Write, stderr, stdout};
+use std::io::{BufWriter, Write, stderr, stdout};
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 
@@ -49,7 +49,8 @@ fn main() -> ExitCode {
         .with_writer(|| Messages)
         // A message that cannot be written is lost, but the run continues.
         .log_internal_errors(false)
-        .with_ansi(stderr().is_terminal())
+        // A closed process's messages pass a filter that lets no such letters through.
+        .with_ansi(false)
         .without_time()
         .with_target(false)
         .init();

@@ -64,9 +64,6 @@ pub fn check(
         |problem: String| experiment.source.error(&(0..0), format!("[isolation] {problem}"));
     experiment.isolation.check().map_err(fault)?;
     let is_closed = is_closed(&experiment, foreign.as_deref());
-    if is_closed {
-        warn_of_tools(&components);
-    }
     warn_of_idle_keys(&experiment, is_closed);
     experiment.warn_of_idle(experiment.assigned.iter().map(String::as_str));
     check_single_instances(&experiment, &components)?;
@@ -142,21 +139,6 @@ fn is_closed(experiment: &Experiment, foreign: Option<&Path>) -> bool {
             false
         }
         (isolate, _) => isolate.unwrap_or(foreign.is_some()),
-    }
-}
-
-/// Warns of FMUs in a closed process that need another program, which it does not reach.
-fn warn_of_tools(components: &[CheckedComponent]) {
-    for CheckedComponent { fmu, .. } in components {
-        let Fmu { description, .. } = &**fmu;
-        let interfaces = [&description.co_simulation, &description.model_exchange];
-        if interfaces.into_iter().flatten().any(|one| one.has("needsExecutionTool")) {
-            tracing::warn!(
-                "{}: a closed process does not reach the program that this FMU needs: if you \
-                 trust the FMU, use --isolate=false, which runs it with your rights",
-                fmu.path.display()
-            );
-        }
     }
 }
 

@@ -22,7 +22,7 @@ pub fn faults(description: &ModelDescription) -> Vec<String> {
     }
     let interfaces = [&description.co_simulation, &description.model_exchange];
     if interfaces.into_iter().flatten().any(|interface| interface.has("needsExecutionTool")) {
-        faults.push("needs the program that exported it to be installed on this machine (needsExecutionTool)".to_string());
+        faults.push("needs the program that exported it (needsExecutionTool), which a closed process does not reach: --isolate=false runs the FMU with your rights".to_string());
     }
     if !description.has_structure {
         faults.push("has no ModelStructure, which lists the outputs".to_string());
@@ -78,18 +78,16 @@ fn check_variable(
     {
         faults.push(format!("the unit \"{}\" of \"{name}\" is not defined", unit.escape_default()));
     }
-    match kind {
-        VariableKind::Real { min: Some(min), max: Some(max), .. } if min > max => {
-            faults.push(format!(
-                "the smallest value of \"{name}\", {min}, is above its largest, {max}"
-            ));
+    let bounds = match kind {
+        VariableKind::Real { min: Some(min), max: Some(max), .. } => Some((*min, *max)),
+        VariableKind::Integer { min: Some(min), max: Some(max) } => {
+            Some((f64::from(*min), f64::from(*max)))
         }
-        VariableKind::Integer { min: Some(min), max: Some(max) } if min > max => {
-            faults.push(format!(
-                "the smallest value of \"{name}\", {min}, is above its largest, {max}"
-            ));
-        }
-        _ => {}
+        _ => None,
+    };
+    if let Some((min, max)) = bounds.filter(|(min, max)| min > max) {
+        faults
+            .push(format!("the smallest value of \"{name}\", {min}, is above its largest, {max}"));
     }
     let start = variable.start.as_deref();
     if let Some(fault) = start.and_then(|start| start_fault(start.trim(), kind, is_fmi3)) {

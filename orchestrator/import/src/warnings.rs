@@ -66,9 +66,7 @@ pub fn at(time: f64) {
 pub(crate) fn is_repeated(line: &str) -> bool {
     static PRINTED: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
     let mut printed = PRINTED.lock();
-    // Colours may come first.
-    let is_warning = line.find("WARN").is_some_and(|place| place < 12);
-    is_warning && !printed.insert(line.to_string())
+    line.trim_start().starts_with("WARN") && !printed.insert(line.to_string())
 }
 
 /// Records or prints a warning of an instance.

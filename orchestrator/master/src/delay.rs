@@ -214,41 +214,24 @@ pub fn algebraic_loop(parts: &[Part], wires: &[Wire]) -> Option<Vec<String>> {
         let part = parts[wire.to.component];
         format!("{}.{}", part.name, part.description.variables[wire.to.variable].name)
     };
-    let mut done = vec![false; wires.len()];
-    for start in 0..wires.len() {
-        let mut path = vec![start];
-        if let Some(cycle) = follow(&mut path, &mut done, wires, &leads_to) {
-            return Some(cycle.iter().map(|&wire| name(&wires[wire])).collect());
+    // What no wire leads to is on no loop, and neither is what only such wires lead to.
+    let mut left: Vec<&Wire> = wires.iter().collect();
+    loop {
+        let before = left.clone();
+        left.retain(|wire| before.iter().any(|other| leads_to(other, wire)));
+        if left.len() == before.len() {
+            break;
         }
     }
-    None
-}
-
-/// Searches for a cycle depth first; a wire that the search has left is on no cycle.
-fn follow(
-    path: &mut Vec<usize>,
-    done: &mut [bool],
-    wires: &[Wire],
-    leads_to: &impl Fn(&Wire, &Wire) -> bool,
-) -> Option<Vec<usize>> {
-    let last = path[path.len() - 1];
-    if done[last] {
-        return None;
-    }
-    for next in 0..wires.len() {
-        if leads_to(&wires[last], &wires[next]) {
-            if let Some(place) = path.iter().position(|&wire| wire == next) {
-                return Some(path[place..].to_vec());
-            }
-            path.push(next);
-            if let Some(cycle) = follow(path, done, wires, leads_to) {
-                return Some(cycle);
-            }
-            path.pop();
+    let mut path = vec![*left.first()?];
+    loop {
+        let last = path[path.len() - 1];
+        let other = left.iter().find(|other| leads_to(other, last))?;
+        if let Some(place) = path.iter().position(|wire| std::ptr::eq(*wire, *other)) {
+            return Some(path[place..].iter().copied().map(name).collect());
         }
+        path.push(other);
     }
-    done[last] = true;
-    None
 }
 
 /// Returns the value of a real parameter in s, from the experiment or otherwise its start value;

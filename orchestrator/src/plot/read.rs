@@ -7,7 +7,7 @@ use cosim::recorder::FILE;
 use cosim_metrics::metrics::Metrics;
 use cosim_report::recording::{Recording, Track, display_unit};
 use serde_json::Value;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -30,7 +30,6 @@ pub(super) fn recording(path: &Path) -> Result<Recording, Error> {
         return Err(Error::experiment(problem));
     }
     let columns = text(&file)?;
-    check_names(&columns, &file)?;
     let mut columns = columns.into_iter();
     let first = columns.next().filter(|(name, _)| name.eq_ignore_ascii_case("time"));
     let Some((_, time)) = first else {
@@ -56,18 +55,6 @@ pub(super) fn recording(path: &Path) -> Result<Recording, Error> {
         run.summary = summary::lines(&run.observe, &Metrics { units, ..metrics });
     }
     Ok(run)
-}
-
-/// Checks that a name belongs to one column only.
-fn check_names(columns: &[(String, Vec<f64>)], file: &Path) -> Result<(), Error> {
-    let mut seen = BTreeSet::new();
-    match columns.iter().find(|(name, _)| !seen.insert(name)) {
-        Some((name, _)) => {
-            let problem = format!("{}: two columns are called {name}", file.display());
-            Err(Error::experiment(problem))
-        }
-        None => Ok(()),
-    }
 }
 
 /// Checks that time never goes backwards.
@@ -234,8 +221,6 @@ mod tests {
         assert!(backwards.ends_with(said), "{backwards}");
         let unknown = fault("time,a.x\n0,1\nNaN,3\n");
         assert!(unknown.ends_with("a.csv, row 3, time: NaN is no time"), "{unknown}");
-        let twice = fault("time,a.x,a.x\n0,1,1\n");
-        assert!(twice.ends_with("a.csv: two columns are called a.x"), "{twice}");
     }
 
     #[test]

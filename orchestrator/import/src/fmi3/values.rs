@@ -57,10 +57,6 @@ impl Lists {
     ) -> Outcome {
         assert_eq!(references.len(), values.len(), "as many values as references");
         for group in &mut self.list(layout, references).groups {
-            if group.is_plain::<V>(values) {
-                group.transfer(unit, false, values.as_mut_ptr().cast())?;
-                continue;
-            }
             let buffer = group.buffer.as_mut_ptr().cast();
             group.transfer(unit, false, buffer)?;
             V::decode(group, values).map_err(|(place, value)| {
@@ -83,10 +79,6 @@ impl Lists {
     ) -> Outcome {
         assert_eq!(references.len(), values.len(), "as many values as references");
         for group in &mut self.list(layout, references).groups {
-            if group.is_plain::<V>(values) {
-                group.transfer(unit, true, values.as_ptr().cast_mut().cast())?;
-                continue;
-            }
             let buffer = group.buffer.as_mut_ptr().cast();
             if group.places.len() < group.arrays.count {
                 group.transfer(unit, false, buffer)?;
@@ -124,14 +116,6 @@ impl List {
 }
 
 impl Group {
-    /// Returns whether the values of the master are those of FMI 3.0, in the same order.
-    fn is_plain<V: Carried>(&self, values: &[V]) -> bool {
-        self.scalar == V::OWN
-            && self.arrays.count == values.len()
-            && self.places.len() == values.len()
-            && self.places == self.arrays.elements
-    }
-
     /// Gets or sets values; there must be room for all elements of the arrays.
     fn transfer(
         &self,
@@ -197,8 +181,6 @@ unsafe trait Plain: Copy + ToString {}
 /// A type of the master.
 #[expect(private_interfaces, reason = "only this module has other types")]
 pub(super) trait Carried: Copy {
-    /// The type of FMI 3.0 with the same bits.
-    const OWN: ScalarType;
     /// Takes values out of the group's buffer.
     fn decode(group: &Group, values: &mut [Self]) -> Result<(), Misfit>;
     /// Puts values into the group's buffer.
@@ -207,8 +189,6 @@ pub(super) trait Carried: Copy {
 
 #[expect(private_interfaces, reason = "as in the trait")]
 impl Carried for f64 {
-    const OWN: ScalarType = ScalarType::Float64;
-
     fn decode(group: &Group, values: &mut [Self]) -> Result<(), Misfit> {
         match group.scalar {
             ScalarType::Float32 => group.decode_as(values, |value: f32| Some(value.into())),
@@ -238,8 +218,6 @@ macro_rules! whole {
 
         #[expect(private_interfaces, reason = "as in the trait")]
         impl Carried for i32 {
-            const OWN: ScalarType = ScalarType::Int32;
-
             fn decode(group: &Group, values: &mut [Self]) -> Result<(), Misfit> {
                 match group.scalar {
                     $(ScalarType::$scalar => {

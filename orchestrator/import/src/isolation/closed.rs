@@ -360,12 +360,7 @@ fn print(line: &str) {
     if warnings::is_repeated(line) {
         return;
     }
-    // Colours of the log are left out.
-    let mut parts = line.split("\u{1b}[");
-    let begin = parts.next().unwrap_or_default().to_string();
-    let plain =
-        parts.fold(begin, |text, part| text + part.split_once('m').map_or(part, |(_, rest)| rest));
-    let shown = plain.trim_end().chars().map(|it| if it.is_control() { ' ' } else { it });
+    let shown = line.trim_end().chars().map(|it| if it.is_control() { ' ' } else { it });
     let _ = writeln!(io::stderr(), "{}", shown.collect::<String>());
 }
 
