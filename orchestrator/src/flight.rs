@@ -2,7 +2,7 @@
 
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
-use cosim::pacing::timer::{self, Monotonic};
+use cosim::pacing::timer::Monotonic;
 use cosim::pacing::{Factor, Pacer, RealTime};
 use cosim::run::{Observer, Sample};
 use cosim::system::{Parameters, System};
@@ -57,9 +57,6 @@ pub(crate) fn fly(
     interrupt: &Interrupt,
     heard: &mut dyn Heard,
 ) -> Result<Flown, Error> {
-    if real_time.is_some() {
-        timer::wake_up_sharply();
-    }
     match system.closing() {
         Some(closing) => fly_closed(system, &closing, (real_time, interrupt), heard),
         None => fly_here(system, real_time, interrupt, heard, |_| ()),

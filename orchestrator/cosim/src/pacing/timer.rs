@@ -1,6 +1,7 @@
 //! A monotonic clock, and a way to wait for an instant on it.
 
-use std::time::Duration;
+use std::sync::LazyLock;
+use std::time::{Duration, Instant};
 
 /// A clock and a way to sleep until it reaches an instant. Instants are counted from the clock's
 /// own origin.
@@ -8,8 +9,7 @@ pub trait Timer {
     /// Returns the current instant on the clock.
     fn now(&self) -> Duration;
 
-    /// Sleeps until the instant. It never returns before it, and returns as soon after it as the
-    /// system can.
+    /// Sleeps until the instant. It never returns before it.
     fn sleep_until(&self, instant: Duration);
 }
 
@@ -17,60 +17,19 @@ pub trait Timer {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Monotonic;
 
-#[cfg(target_os = "linux")]
-mod system {
-    use super::{Duration, Monotonic, Timer};
-    use rustix::thread::{ClockId, Timespec, clock_nanosleep_absolute, set_current_timer_slack};
-    use std::num::NonZeroU64;
+static ORIGIN: LazyLock<Instant> = LazyLock::new(Instant::now);
 
-    impl Timer for Monotonic {
-        fn now(&self) -> Duration {
-            // The clock starts with the system, so that its time is never negative.
-            Duration::try_from(rustix::time::clock_gettime(ClockId::Monotonic)).unwrap_or_default()
-        }
-
-        fn sleep_until(&self, instant: Duration) {
-            let Ok(until) = Timespec::try_from(instant) else { return };
-            // The loop is needed because a signal ends the sleep early.
-            while clock_nanosleep_absolute(ClockId::Monotonic, &until)
-                == Err(rustix::io::Errno::INTR)
-            {}
-        }
+impl Timer for Monotonic {
+    fn now(&self) -> Duration {
+        ORIGIN.elapsed()
     }
 
-    /// Asks the system not to delay this thread's wake-ups in order to combine them with others.
-    pub fn wake_up_sharply() {
-        if let Err(error) = set_current_timer_slack(NonZeroU64::new(1)) {
-            tracing::debug!("the timer slack stays as it is: {error}");
+    fn sleep_until(&self, instant: Duration) {
+        while let Some(rest) = instant.checked_sub(self.now()).filter(|rest| !rest.is_zero()) {
+            std::thread::sleep(rest);
         }
     }
 }
-
-#[cfg(not(target_os = "linux"))]
-mod system {
-    use super::{Duration, Monotonic, Timer};
-    use std::sync::LazyLock;
-    use std::time::Instant;
-
-    static ORIGIN: LazyLock<Instant> = LazyLock::new(Instant::now);
-
-    impl Timer for Monotonic {
-        fn now(&self) -> Duration {
-            ORIGIN.elapsed()
-        }
-
-        fn sleep_until(&self, instant: Duration) {
-            while let Some(rest) = instant.checked_sub(self.now()).filter(|rest| !rest.is_zero()) {
-                std::thread::sleep(rest);
-            }
-        }
-    }
-
-    /// Does nothing, because this system has no such setting.
-    pub fn wake_up_sharply() {}
-}
-
-pub use system::wake_up_sharply;
 
 #[cfg(test)]
 pub(crate) mod fake {
