@@ -1,6 +1,6 @@
 //! The command `campaign`.
 
-use crate::command_line::{Many, Subject};
+use crate::arguments::{Many, Subject};
 use crate::failure::Failure;
 use crate::run::{self, Run};
 use campaign::definition::Campaign;

@@ -2,10 +2,10 @@
 
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
-use cosim::pacing::timer::Monotonic;
 use cosim::pacing::{Factor, Pacer, RealTime};
 use cosim::run::{Observer, Sample};
 use cosim::system::{Parameters, System};
+use cosim::timer::Monotonic;
 use fmu_import::isolation::{Closed, Closing, Link};
 use fmu_import::warnings;
 use linear::measures::{self, Measured};

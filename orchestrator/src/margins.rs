@@ -1,6 +1,6 @@
 //! The command `margins`.
 
-use crate::command_line::Subject;
+use crate::arguments::Subject;
 use crate::failure::Failure;
 use crate::picture;
 use clap::Args;

@@ -1,6 +1,6 @@
 //! The command `pack`, which writes an experiment as an SSP archive.
 
-use crate::command_line::Subject;
+use crate::arguments::Subject;
 use crate::failure::Failure;
 use clap::Args;
 use cosim::error::Error;

@@ -1,6 +1,6 @@
 //! The command `reproduce`, which repeats a paper's comparison.
 
-use crate::command_line::Many;
+use crate::arguments::Many;
 use crate::failure::Failure;
 use clap::Args;
 use cosim::experiment::{Overrides, Process};

@@ -1,7 +1,7 @@
 //! Runs an experiment and writes its results. Observers of the system record, measure and
 //! draw it.
 
-use crate::command_line::Subject;
+use crate::arguments::Subject;
 use crate::failure::Failure;
 use crate::flight::{self, Flown, Heard};
 use crate::summary::{self, RunReport};

@@ -24,6 +24,7 @@ pub mod signal;
 pub mod ssp;
 mod stopwatch;
 pub mod system;
+pub mod timer;
 mod topology;
 pub mod variation;
 mod watch;

@@ -3,9 +3,9 @@
 
 use crate::error::Error;
 use crate::interrupt::Interrupt;
-use crate::pacing::timer::{Monotonic, Timer};
 use crate::pacing::{Factor, Pacer};
 use crate::stopwatch::{Spent, Stopwatch};
+use crate::timer::{Monotonic, Timer};
 use fmi_master::master::{Failed, Master, Member, Watcher};
 use fmu_import::warnings;
 use std::rc::Rc;

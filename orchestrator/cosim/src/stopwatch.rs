@@ -1,7 +1,7 @@
 //! An instance whose calls are timed. All calls count, because an instance may do the work of a
 //! step only when its outputs are read.
 
-use crate::pacing::timer::Timer;
+use crate::timer::Timer;
 use fmi_master::forward;
 use fmi_master::instance::{Instance, Outcome};
 use std::cell::Cell;

@@ -1,15 +1,14 @@
 //! Runs that keep in step with the wall clock.
 //!
 //! Communication point t is due at t₀ + (t − start) / factor on the monotonic clock: these instants
-//! are absolute, so that errors do not accumulate. The master waits for each instant ([`timer`]),
+//! are absolute, so that errors do not accumulate. The master waits for each instant ([`crate::timer`]),
 //! then steps the instances and transfers values. The values that a component computes at one of
 //! its communication points must be ready before its next one; if they are not, a *deadline is
 //! missed*. The run then continues at once, without waiting, until it is back in step.
 
-pub mod timer;
-
 use crate::interrupt::Interrupt;
 use crate::stopwatch::Spent;
+use crate::timer::Timer;
 use fmi_master::clock::Clock;
 use fmi_master::quantity::rounded;
 use serde::{Deserialize, Serialize};
@@ -18,7 +17,6 @@ use std::fmt;
 use std::rc::Rc;
 use std::str::FromStr;
 use std::time::Duration;
-use timer::Timer;
 
 /// Longest uninterrupted part of a wait. After each part the pacer checks whether the run is to
 /// end.
@@ -160,9 +158,9 @@ impl Pacer {
 
 #[cfg(test)]
 mod tests {
-    use super::timer::fake::Fake;
     use super::*;
     use crate::interrupt::Request;
+    use crate::timer::fake::Fake;
 
     const MS: Duration = Duration::from_millis(1);
 
