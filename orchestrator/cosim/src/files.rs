@@ -18,7 +18,8 @@ pub struct PartialFile {
 }
 
 impl PartialFile {
-    /// Begins a file, whose folder is made if it is missing.
+    /// Begins a file, whose folder is made if it is missing. Parts of this file that killed
+    /// processes have left are removed.
     ///
     /// # Errors
     /// Returns an error if the file cannot be created.
@@ -26,10 +27,13 @@ impl PartialFile {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(Error::file(folder))?;
         }
+        remove_abandoned(path);
         let mut partial = path.as_os_str().to_owned();
         partial.push(format!(".{}.part", std::process::id()));
         let partial = PathBuf::from(partial);
         let file = File::create(&partial).map_err(Error::file(path))?;
+        // Some network drives have no locks; there nothing is removed.
+        let _ = file.try_lock();
         Ok(Self { path: path.to_path_buf(), partial, file })
     }
 
@@ -53,6 +57,21 @@ impl Drop for PartialFile {
         // An incomplete file is of no use, and it may be what fills the disk. A complete one has
         // another name by now.
         let _ = fs::remove_file(&self.partial);
+    }
+}
+
+/// Removes incomplete files of this name that no process is writing any more.
+fn remove_abandoned(path: &Path) {
+    let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else { return };
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let begin = format!("{}.", name.to_string_lossy());
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let other = entry.file_name().to_string_lossy().into_owned();
+        let number = other.strip_prefix(&begin).and_then(|rest| rest.strip_suffix(".part"));
+        let is_partial = number.is_some_and(|number| number.parse::<u32>().is_ok());
+        if is_partial && File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok()) {
+            let _ = fs::remove_file(entry.path());
+        }
     }
 }
 
@@ -106,6 +125,27 @@ mod tests {
         let beside = |path: &Path| fs::read_dir(path).unwrap().count();
         assert_eq!((beside(folder.path()), beside(path.parent().unwrap())), (1, 1));
         assert_eq!(beside(&folder.path().join("made")), 1);
+    }
+
+    #[test]
+    fn what_a_killed_process_has_left_of_a_file_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        let (left, other) =
+            (folder.path().join("a.txt.1.part"), folder.path().join("b.txt.1.part"));
+        fs::write(&left, "half").unwrap();
+        fs::write(&other, "half").unwrap();
+        let mut written = folder.path().join("a.txt.2.part");
+        fs::write(&written, "half").unwrap();
+        let held = File::open(&written).unwrap();
+        held.try_lock().unwrap();
+        write(&path, "whole").unwrap();
+        assert!(!left.exists() && other.exists() && written.exists());
+        drop(held);
+        write(&path, "whole").unwrap();
+        assert!(!written.exists());
+        written.pop();
+        assert_eq!(fs::read_dir(written).unwrap().count(), 2);
     }
 
     #[test]
