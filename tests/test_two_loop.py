@@ -51,7 +51,7 @@ def member(results, run: str) -> dict:
 
 
 def measure(results, run: str, name: str):
-    return member(results, run)["measures"][name]
+    return member(results, run)[f"measure.{name}"]
 
 
 def verdict(results, words: str) -> str:
@@ -102,7 +102,7 @@ def test_regress_steps_settle_and_stay_within_the_reach_about_each_axis(results)
     assert measure(results, "direct", "settling-02") == pytest.approx(6.01, abs=0.05)
     assert measure(results, "direct", "late") == pytest.approx(0.087, abs=0.005)
     for axis in ("roll", "pitch", "yaw"):
-        assert member(results, "direct")["within"][f"reach-{axis}"]["ratio"] < 1.0
+        assert member(results, "direct")[f"within.reach-{axis}.ratio"] < 1.0
 
 
 def test_integrals_do_not_wind_up(results):

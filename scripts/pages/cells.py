@@ -37,17 +37,8 @@ class Study:
 
     def metric(self, path: str) -> list:
         """A metric of all members of a run, `None` where it does not exist."""
-        run, *keys = path.split(".")
-        if keys[0] == "measure":
-            keys[0] = "measures"
-        elif keys[0] != "within":
-            keys.insert(0, "metrics")
-        values = []
-        for member in self.results["runs"][run]["members"]:
-            for key in keys:
-                member = member[key]
-            values.append(member)
-        return values
+        run, name = path.split(".", 1)
+        return [member[name] for member in self.results["runs"][run]["members"]]
 
     def value(self, name: str) -> float:
         matches = [value["value"] for value in self.results["values"] if value["id"] == name]

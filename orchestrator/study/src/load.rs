@@ -10,6 +10,7 @@ use cosim::experiment::Experiment;
 use serde::de::DeserializeOwned;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use sweep::vary::Vary;
 
 /// Reads a study in which lists are expanded, and no run extends another one.
 fn spelled_out<T: DeserializeOwned>(source: &Source) -> Result<T, Error> {
@@ -53,6 +54,7 @@ impl Study {
         study.most_cases = study.runs.iter().any(|run| run.count() > most).then_some(most);
         for run in &mut study.runs {
             run.cases = Some(run.count().min(most));
+            run.vary = Vary::counted(&run.seeds).into_iter().collect();
         }
         Ok(study)
     }
@@ -153,8 +155,8 @@ impl Study {
             _ if run.experiment.as_os_str().is_empty() => Some("experiment is missing"),
             _ if !run.set_for.is_empty() => Some("set_for is a key of a scenario in a grid"),
             Some(0) => Some("cases = 0, but it must be at least 1"),
-            Some(_) if run.vary.is_empty() => Some("cases needs vary"),
-            None if !run.vary.is_empty() => Some("vary needs cases, their number"),
+            Some(_) if run.seeds.is_empty() => Some("cases needs seeds"),
+            None if !run.seeds.is_empty() => Some("seeds need cases, their number"),
             _ => None,
         };
         if let Some(fault) = fault {

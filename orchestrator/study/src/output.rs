@@ -4,7 +4,7 @@ use crate::claims::{self, Checked};
 use crate::comparisons::{Check, Claim};
 use crate::definition::Study;
 use crate::drawings::Figure;
-use crate::results::{Metric, Results, RunResult};
+use crate::results::{Results, RunResult};
 use crate::runs::Run;
 use crate::{figures, origin, page};
 use cosim::error::Error;
@@ -13,9 +13,8 @@ use cosim_report::figure::{self, svg};
 use fmi_master::quantity::rounded;
 use maud::Markup;
 use serde_json::{Value, json};
-use std::collections::BTreeSet;
 use std::path::Path;
-use sweep::table::Column;
+use sweep::table::CaseTable;
 
 /// A claim in our words, with its verdict.
 pub(crate) type Judgement = (String, claims::Verdict);
@@ -75,7 +74,7 @@ fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
             "fmu": run.fmu,
             "set": run.set,
             "unset": run.unset,
-            "members": members(study, run, result),
+            "members": members(result),
             "samples": result.series.samples,
         });
         (run.id.get_ref().clone(), entry)
@@ -105,42 +104,17 @@ fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
 }
 
 /// Returns the numbers of each case, by the names of the study's references.
-fn members(study: &Study, run: &Run, result: &RunResult) -> Vec<Value> {
-    let mut members = Vec::new();
-    let mut first = 0;
-    for part in &result.parts {
-        for row in 0..part.rows() {
-            let mut member = json!({ "values": {}, "metrics": {}, "within": {}, "measures": {} });
-            for Column { name, values } in &part.columns {
-                let value = values.json(row);
-                if name == "case" || run.varied().any(|varied| varied == name) {
-                    member["values"][name] = value;
-                } else if let Some(id) = name.strip_prefix("measure.") {
-                    member["measures"][id] = value;
-                } else if let Some((id, what)) =
-                    name.strip_prefix("within.").and_then(|name| name.rsplit_once('.'))
-                {
-                    member["within"][id][what] = value;
-                } else if let Some(component) = name.strip_prefix("step_us.") {
-                    member["metrics"]["step_us"][component] = value;
-                } else {
-                    member["metrics"][name] = value;
-                }
-            }
-            for (within, _) in study.bounds_of(run) {
-                let ratio = Metric::parse(&format!("within.{}.ratio", within.id), study, run);
-                let numbers = ratio.map(|metric| result.numbers(&metric)).unwrap_or_default();
-                member["within"][&within.id]["ratio"] = json!(numbers.get(first + row));
-            }
-            members.push(member);
-        }
-        first += part.rows();
-    }
-    members
+fn members(result: &RunResult) -> Vec<Value> {
+    let row = |part: &CaseTable, row: usize| {
+        let cells =
+            part.columns.iter().map(|column| (column.name.clone(), column.values.json(row)));
+        cells.collect::<Value>()
+    };
+    let parts = result.parts.iter();
+    parts.flat_map(|part| (0..part.rows()).map(move |at| row(part, at))).collect()
 }
 
-/// Describes a quick look, the runs that lose the attitude, and the runs that vary a parameter
-/// without any effect, for example the seed of a constant disturbance.
+/// Describes a quick look, and the runs that are lost.
 pub(crate) fn notes(results: &Results) -> Vec<String> {
     let mut notes = Vec::from_iter(page::quickly(results.study));
     for (run, result) in results.pairs() {
@@ -155,28 +129,6 @@ pub(crate) fn notes(results: &Results) -> Vec<String> {
                 lost.len()
             ));
         }
-        if count > 1 && is_constant(run, result) {
-            let names: Vec<&str> = run.varied().map(String::as_str).collect();
-            let names = names.join(" and ");
-            notes.push(format!("{id}: {names} has no effect, all {count} runs are the same"));
-        }
     }
     notes
-}
-
-/// Returns whether all cases of a run have the same results, apart from computing times.
-fn is_constant(run: &Run, result: &RunResult) -> bool {
-    let is_result = |name: &str| {
-        let is_time = run.observe.metrics.get(name).is_some_and(|measure| measure.timing);
-        name != "case"
-            && !is_time
-            && !name.starts_with("step_us.")
-            && run.varied().all(|varied| varied != name)
-    };
-    let columns = result.parts.iter().flat_map(|part| &part.columns);
-    let names: BTreeSet<&str> = columns.map(|column| column.name.as_str()).collect();
-    names.into_iter().filter(|name| is_result(name)).all(|name| {
-        let numbers = result.column(name);
-        numbers.iter().all(|number| *number == numbers[0])
-    })
 }

@@ -248,7 +248,7 @@ fn all_runs(results: &Results) -> Markup {
         let changes = html! {
             @for (name, fmu) in &run.fmu { code { (name) " = " (fmu) } " " }
             @for (name, value) in &run.set { code { (name) " = " (value) } " " }
-            @for varied in run.varied() { code { (varied) " varies" } " " }
+            @for varied in &run.seeds { code { (varied.get_ref()) " varies" } " " }
         };
         let experiment = html! { code { (run.experiment.display()) } };
         vec![name, experiment, changes, html! { (result.cases()) }]

@@ -2,7 +2,7 @@
 
 use crate::curves::{Curves, Series, bands, widen};
 use crate::definition::Study;
-use crate::runs::Run;
+use crate::runs::{Run, Within};
 use crate::table::table;
 use cosim::error::Error as Single;
 use cosim::experiment::{Experiment, Measure, MeasureKind, Observe, Overrides};
@@ -127,9 +127,8 @@ impl<'a> Preparation<'a> {
             resolved.map_err(|message| self.study.run_fault(self.run, &message))
         });
         let resolved = resolved.collect::<Result<Vec<_>, Single>>()?;
-        let units = resolved.iter().map(|resolved| resolved.unit.clone()).collect();
         let stride = flight.system().clock.ticks().div_ceil(POINTS).max(1);
-        Ok(Instances { preparation: self, flight, track: Track::new(resolved, stride), units })
+        Ok(Instances { preparation: self, flight, track: Track::new(resolved, stride) })
     }
 }
 
@@ -164,8 +163,6 @@ fn key(run: &Run, drawn: &DrawnSignals, observe: &Observe) -> String {
         run.set,
         run.unset,
         run.vary,
-        run.design,
-        run.seed,
         run.timed,
         observe,
         drawn.series,
@@ -181,7 +178,6 @@ pub(crate) struct Instances<'a> {
     flight: Flight<'a>,
     /// Signals that are drawn, in the order of [`DrawnSignals::series`].
     track: Track,
-    units: Vec<String>,
 }
 
 /// State that a thread keeps from one part to the next: opened archives, and the instances of the
@@ -257,11 +253,10 @@ impl Instances<'_> {
 
     /// Returns the time series of the last case, to which the single values of metrics are added.
     fn series(&self, samples: BTreeMap<String, Vec<f64>>) -> Series {
-        let signals = || self.preparation.drawn.series.iter().cloned();
+        let signals = self.preparation.drawn.series.iter().cloned();
         Series {
             time: self.track.time.clone(),
-            signals: signals().zip(self.track.values.iter().cloned()).collect(),
-            units: signals().zip(self.units.iter().cloned()).collect(),
+            signals: signals.zip(self.track.values.iter().cloned()).collect(),
             samples,
             response: None,
         }
@@ -275,6 +270,13 @@ impl Instances<'_> {
         let seen = if is_drawn { &mut track[..] } else { &mut [] };
         let mut flown = self.flight.fly(case, seen)?;
         std::mem::replace(&mut flown.outcome, Ok(()))?;
+        let Preparation { study, run, .. } = self.preparation;
+        for (Within { id, bound, .. }, _) in study.bounds_of(run) {
+            let bound = study.number(bound)?;
+            let ratio = flown.metrics.number(&format!("within.{id}.largest"));
+            let ratio = ratio.map(|largest| Value::Number(largest / bound));
+            flown.metrics.asked.insert(format!("within.{id}.ratio"), ratio);
+        }
         Ok(flown)
     }
 }

@@ -11,7 +11,6 @@ use fmi_master::names;
 use std::collections::BTreeMap;
 use sweep::parts::PartResult;
 use sweep::table::CaseTable;
-use toml::Spanned;
 
 /// Results of one run of the study.
 #[derive(Clone, Debug, Default)]
@@ -64,13 +63,12 @@ impl RunResult {
                 let fitting = parameters.filter(|(name, _)| names::matches(pattern, name));
                 fitting.filter_map(|(_, value)| value.as_f64()).map(Some).collect()
             }
-            Metric::Column { name, bound, is_time } => {
+            Metric::Column { name, is_time } => {
                 let mut numbers = self.column(name);
                 if *is_time {
                     numbers.truncate(1);
                 }
-                // A division by 1 changes no bit.
-                numbers.into_iter().map(|number| number.map(|number| number / bound)).collect()
+                numbers
             }
         }
     }
@@ -79,12 +77,10 @@ impl RunResult {
 /// A metric, which is a number for each case of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Metric {
-    /// A column of the run's table, divided by a bound.
+    /// A column of the run's table.
     Column {
         /// Name of the column.
         name: String,
-        /// Bound by which the numbers are divided.
-        bound: f64,
         /// Whether it is a computing time, which differs from run to run and is taken from the
         /// first case only.
         is_time: bool,
@@ -100,50 +96,25 @@ impl Metric {
     ///
     /// # Errors
     /// Returns an error if there is no such metric.
-    pub(crate) fn parse(text: &str, study: &Study, run: &Run) -> Result<Self, String> {
-        let column = |is_time| Ok(Self::Column { name: text.to_string(), bound: 1.0, is_time });
-        let has = |what: &str, ids: &[Spanned<String>], name: &str| {
-            let mut names = ids.iter().map(|id| id.get_ref().as_str());
-            let hint = names::hint(name, names.clone());
-            let run = run.id.get_ref();
-            let missing = || format!("the run \"{run}\" has no {what} \"{name}\"{hint}");
-            names.any(|other| other == name).then_some(()).ok_or_else(missing)
-        };
-        if let Some((id, what)) =
-            text.strip_prefix("within.").and_then(|rest| rest.rsplit_once('.'))
-        {
-            has("within", &run.within, id)?;
-            return match what {
-                "share" | "largest" => column(false),
-                "ratio" => {
-                    let within = study.within.iter().find(|within| within.id == id);
-                    let bound = within.map(|within| study.values.number(&within.bound));
-                    let bound = bound.transpose()?.unwrap_or(f64::NAN);
-                    let name = format!("within.{id}.largest");
-                    Ok(Self::Column { name, bound, is_time: false })
-                }
-                _ => {
-                    Err(format!("\"{text}\": within.{id} has the metrics share, largest and ratio"))
-                }
-            };
-        }
-        if let Some(id) = text.strip_prefix("measure.") {
-            has("measure", &run.measures, id)?;
-            return column(false);
-        }
+    pub(crate) fn parse(text: &str, run: &Run) -> Result<Self, String> {
         if let Some((component, name)) = text.strip_prefix("parameter.").and_then(names::split) {
             return Ok(Self::Parameter(component.into(), name.into()));
         }
-        if text.starts_with("step_us.") {
-            let problem = || format!("\"{text}\": the run \"{}\" is not timed", run.id.get_ref());
-            return if run.timed { column(true) } else { Err(problem()) };
+        let column = |is_time| Ok(Self::Column { name: text.to_string(), is_time });
+        if text.starts_with("step_us.") && run.timed {
+            return column(true);
         }
+        let measured = run.measures.iter().map(|id| format!("measure.{}", id.get_ref()));
+        let within = run.within.iter().flat_map(|id| {
+            ["share", "largest", "ratio"].map(|what| format!("within.{}.{what}", id.get_ref()))
+        });
         let metrics = Metrics::reproducible_names(&run.observe);
+        let metrics: Vec<String> = metrics.into_iter().chain(measured).chain(within).collect();
         if metrics.iter().any(|name| name == text) {
             return column(run.observe.metrics.get(text).is_some_and(|measure| measure.timing));
         }
         let hint = names::hint(text, metrics.iter().map(String::as_str));
-        Err(format!("there is no metric \"{text}\"{hint}"))
+        Err(format!("the run \"{}\" has no metric \"{text}\"{hint}", run.id.get_ref()))
     }
 }
 
@@ -189,7 +160,7 @@ pub(crate) fn resolve(study: &Study, reference: &str) -> Result<(usize, Metric),
         let hint = names::hint(id, study.runs.iter().map(|run| run.id.get_ref().as_str()));
         format!("\"{reference}\": there is no run \"{id}\"{hint}")
     })?;
-    Ok((place, Metric::parse(metric, study, &study.runs[place])?))
+    Ok((place, Metric::parse(metric, &study.runs[place])?))
 }
 
 /// Returns whether a quantity refers to `run.metric` rather than to a value.

@@ -71,17 +71,13 @@ pub struct Run {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, BTreeMap<String, cosim::experiment::Scalar>>")]
     pub set_for: BTreeMap<Spanned<String>, BTreeMap<String, Value>>,
-    /// Parameters that vary from case to case, as in a campaign. Without them there is one case.
+    /// Seeds that are 1 in the first case, 2 in the next one, and so on. Without them there is one
+    /// case.
     #[serde(default)]
-    pub vary: Vec<Vary>,
-    /// Number of cases of the run, which `vary` needs.
+    #[schemars(with = "Vec<String>")]
+    pub seeds: Vec<Spanned<String>>,
+    /// Number of cases of the run, which `seeds` need.
     pub cases: Option<u64>,
-    /// Design that places the cases in the space of the varied parameters.
-    #[serde(default)]
-    pub design: DesignKind,
-    /// Seed of all random numbers, by default 1. Case k depends on the seed and k alone.
-    #[serde(default = "one")]
-    pub seed: u64,
     /// Whether the first case has the machine for itself, so that its computing times are
     /// meaningful.
     #[serde(default)]
@@ -97,10 +93,9 @@ pub struct Run {
     /// Metrics, panels and limits of the run's experiment. This is not a key of a study file.
     #[serde(skip)]
     pub observe: Observe,
-}
-
-fn one() -> u64 {
-    1
+    /// Seeds as the parameters that vary. This is not a key of a study file.
+    #[serde(skip)]
+    pub(crate) vary: Vec<Vary>,
 }
 
 impl Run {
@@ -113,8 +108,8 @@ impl Run {
     pub fn variation(&self) -> Variation<'_> {
         Variation {
             vary: &self.vary,
-            design: self.design,
-            seed: self.seed,
+            design: DesignKind::Random,
+            seed: 1,
             cases: Some(self.count()),
             set: self.set.keys().map(String::as_str).collect(),
         }
@@ -131,11 +126,6 @@ impl Run {
             }
             source => Error::Run { run: run.as_str().into(), source },
         }
-    }
-
-    /// Returns the names of all parameters that vary.
-    pub fn varied(&self) -> impl Iterator<Item = &String> {
-        self.vary.iter().flat_map(Vary::names)
     }
 }
 

@@ -7,7 +7,7 @@ use toml::{Spanned, Value};
 /// A parameter that varies from case to case, or several, with the distribution of the values.
 /// Exactly one of the keys from `uniform` to `case` is given. A number may be a text with a unit
 /// (`"5 deg"`), or with a percent sign, which denotes percent of the value in the experiment.
-#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Vary {
     /// Parameter, or input without a connection, as `component.parameter`. Several in a list all
@@ -50,6 +50,15 @@ pub(crate) enum Asked<'a> {
 }
 
 impl Vary {
+    /// Returns the variation of parameters that are all 1 in the first case, 2 in the next one, and
+    /// so on; `None` if there are no parameters.
+    pub fn counted(parameters: &[Spanned<String>]) -> Option<Self> {
+        let first = parameters.first()?;
+        let names = parameters.iter().map(|name| name.get_ref().clone()).collect();
+        let parameter = Some(Spanned::new(first.span(), OneOrMore::More(names)));
+        Some(Self { parameter, case: Some(1), ..Self::default() })
+    }
+
     /// Returns the names of all parameters.
     pub fn names(&self) -> impl Iterator<Item = &String> {
         let shared = self.parameter.iter().flat_map(|names| names.get_ref().names());

@@ -22,7 +22,7 @@ label = "seeds"
 color = "#000000"
 experiment = "loop.toml"
 set = { "gain.pause" = 0.001 }
-vary = [{ parameter = "gain.noise.seed", case = 1 }]
+seeds = ["gain.noise.seed"]
 cases = 60
 measures = ["last"]
 [[measure]]

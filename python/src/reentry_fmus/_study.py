@@ -98,16 +98,4 @@ def reproduce(
 
 def table(members: list[dict[str, Any]]) -> pd.DataFrame:
     """Makes a table of the cases of a run, with their numbers as index."""
-    rows = []
-    for member in members:
-        measures = {f"measure.{name}": value for name, value in member["measures"].items()}
-        within = {
-            f"within.{name}.{what}": value
-            for name, bound in member["within"].items()
-            for what, value in bound.items()
-        }
-        metrics = {name: value for name, value in member["metrics"].items() if name != "step_us"}
-        times = member["metrics"].get("step_us", {})
-        step_us = {f"step_us.{component}": time for component, time in times.items()}
-        rows.append({**member["values"], **metrics, **measures, **within, **step_us})
-    return pd.DataFrame(rows).set_index("case")
+    return pd.DataFrame(members).set_index("case")
