@@ -118,15 +118,11 @@ USES = {
     "margins": ["margins", "lqr", "--at", "1", "--open", "plant.moment.*", "--model", "out.json"],
     "exchange": ["run", "exchange.toml", "--out", "out", "--quiet", "--stop", "2"],
     "campaign": ["campaign", "few.toml", "--out", "out", "--jobs", "1", "--quiet", "--stop", "2"],
-    # The folder of a kept case is the only one of the user in which a closed process may write: also the log.
-    "closed": ["campaign", "few.toml", "--out", "out", "--jobs", "1", "--quiet", "--stop", "2", "--isolate"],
 }
 CAMPAIGN = f"""#:schema {EXPERIMENTS}/../../schema/campaign.json
 title = "Few cases"
 experiment = "{EXPERIMENTS}/lqr.toml"
 cases = 4
-metrics = ["ems_deg"]
-keep = {{ by = "ems_deg", worst = 1 }}
 
 [[vary]]
 parameter = "plant.disturbance.seed"
@@ -146,13 +142,8 @@ MODES = {"2": ("complete", "continuous"), "3": ("step", "continuous")}
 
 @pytest.mark.parametrize("use", USES)
 @pytest.mark.parametrize("version", ["2", "3"])
-def test_the_orchestrator_keeps_to_the_standard(watched, tmp_path, monkeypatch, version, use):
+def test_the_orchestrator_keeps_to_the_standard(watched, tmp_path, version, use):
     units = [watched(name, version) for name in ("ReentryPlant", "LQR")]
-    if use == "closed":
-        kept = tmp_path / "out" / "cases" / "0"
-        monkeypatch.setenv("LC_STRICT_LOGS", str(kept))
-        for unit in units:
-            unit.log = kept / unit.log.name
     (tmp_path / "few.toml").write_text(CAMPAIGN)
     (tmp_path / "exchange.toml").write_text(EXCHANGE)
     command = [program("orchestrator"), *USES[use], "--fmu-dir", units[0].folder]

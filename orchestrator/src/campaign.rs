@@ -146,7 +146,7 @@ fn fly_case(
     let folder = asked.many.out.clone();
     let folder =
         folder.unwrap_or_else(|| flights::folder(plan, None).join("cases").join(case.to_string()));
-    let (_, experiment) = plan.write_case(case, &folder)?;
+    let experiment = plan.write_case(case, &folder)?;
     let Overrides { law, process, .. } = overrides;
     let overrides = Overrides { law, process, ..Overrides::default() };
     law::in_case(Some(case));

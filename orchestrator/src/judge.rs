@@ -35,7 +35,7 @@ pub(crate) fn judge(experiment: &Path, fmu_dirs: &[PathBuf], out: &Path) -> Resu
     }
     let _folder = Folder::take(out)?;
     let interrupt = Interrupt::default();
-    let parameters = system.apart(&interrupt, &[], || {
+    let parameters = system.apart(&interrupt, || {
         let mut run = system.start(&interrupt)?;
         Ok(json!(system.parameters(&mut run)?).to_string())
     })?;

@@ -59,7 +59,7 @@ impl PrintMargins {
             open = asked.ok_or_else(|| missing("--open SIGNAL"))?.open;
         }
         let linearise = || linear::linearise::linearise(system.clone(), at, &open, interrupt);
-        Ok(system.apart(interrupt, &[], linearise)?)
+        Ok(system.apart(interrupt, linearise)?)
     }
 }
 

@@ -58,9 +58,6 @@ pub struct Campaign {
     /// Limits that each case keeps or breaks.
     #[serde(default, rename = "limit")]
     pub limits: Vec<Limit>,
-    /// Choice of the cases whose results are kept in full.
-    #[serde(default)]
-    pub keep: Keep,
     /// Search for the worst case, for `orchestrator campaign --worst`.
     pub search: Option<Search>,
     /// The campaign file, together with the files that it extends. This is not a key of the file.
@@ -85,17 +82,6 @@ pub struct Limit {
     pub at_most: Option<f64>,
     /// Smallest value that keeps the limit, in the unit of the measure.
     pub at_least: Option<f64>,
-}
-
-/// Choice of the cases whose results are kept in full, as `orchestrator run` writes them.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Keep {
-    /// Number of kept cases with the largest values of `by`.
-    pub worst: u32,
-    /// Measure that orders the cases.
-    #[schemars(with = "Option<String>")]
-    pub by: Option<Spanned<String>>,
 }
 
 /// A search for the worst case.
@@ -196,10 +182,6 @@ impl Campaign {
             (
                 self.search.as_ref().is_some_and(|search| search.cases == 0),
                 "[search] cases = 0, but it must be at least 1",
-            ),
-            (
-                self.keep.worst > 0 && self.keep.by.is_none(),
-                "[keep] worst needs by, the measure that orders the cases",
             ),
             (self.vary.is_empty(), "nothing varies: add a [[vary]]"),
         ];

@@ -5,7 +5,7 @@ use crate::flight::CaseStatus;
 use crate::plan::Plan;
 use crate::sensitivity::{Input, Sensitivity, sensitivities};
 use serde::Serialize;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use sweep::statistics::{CONFIDENCE, Probability, Summary, summary};
 use sweep::table::CaseTable;
 
@@ -109,13 +109,6 @@ fn says(plan: &Plan, limit: &Limit) -> String {
         (None, least) => ("≥", least.unwrap_or(f64::NAN)),
     };
     format!("{} {sign} {bound} {unit}", plan.words(name)).trim_end().to_string()
-}
-
-/// Returns the numbers of the cases whose results are to be kept in full.
-pub(crate) fn chosen(plan: &Plan, table: &CaseTable) -> BTreeSet<u64> {
-    let keep = &plan.campaign.keep;
-    let Some(by) = &keep.by else { return BTreeSet::new() };
-    worst(&table.numbers(by.get_ref()), keep.worst as usize).into_iter().collect()
 }
 
 /// Returns the numbers of the cases with the largest values, the largest first.

@@ -7,9 +7,7 @@ use cosim::interrupt::Interrupt;
 use cosim::run::Observer;
 use cosim::system::{Opened, System};
 use cosim::variation::SettingValue;
-use cosim_report::recording::watch::Watch;
 use serde::{Deserialize, Serialize};
-use std::path::Path;
 use sweep::flight::{Flown, columns};
 use sweep::table::{CaseTable, Column, Values};
 
@@ -85,22 +83,6 @@ impl<'a> Flight<'a> {
     /// Returns the system whose cases are flown. Signals that are probed now are seen by observers.
     pub fn system(&mut self) -> &mut System {
         self.instances.system()
-    }
-
-    /// Flies a case to its end and writes the files of a single run: the recorded variables and the
-    /// plot.
-    ///
-    /// # Errors
-    /// The errors are those of [`Self::fly`], and of files that cannot be written.
-    pub fn keep(mut self, case: u64, folder: &Path, title: &str) -> Result<(), Error> {
-        let system = self.instances.system();
-        let mut watch = Watch::new(system)?;
-        let mut recorder = system.recorder(folder)?;
-        let values = self.plan.sweep.values(case);
-        let flown = self.fly_with(case, values, &mut [&mut recorder, &mut watch]);
-        recorder.finish()?;
-        watch.draw(&folder.join("plot.svg"), title)?;
-        flown.map(drop)
     }
 
     /// Flies the case with this number.

@@ -68,15 +68,15 @@ impl Plan {
         stem.map_or(campaign.clone(), |stem| format!("{campaign}-{}", stem.to_string_lossy()))
     }
 
-    /// Writes a case as an experiment into a folder, and returns title and path of it.
+    /// Writes a case as an experiment into a folder, and returns the path of it.
     ///
     /// # Errors
     /// Returns an error if the file cannot be written.
-    pub fn write_case(&self, case: u64, folder: &Path) -> Result<(String, PathBuf), Error> {
+    pub fn write_case(&self, case: u64, folder: &Path) -> Result<PathBuf, Error> {
         let title = format!("{}, case {case}", self.campaign.title);
         let path = folder.join("case.toml");
         files::write(&path, self.sweep.experiment_of(&title, &self.sweep.values(case))?)?;
-        Ok((title, path))
+        Ok(path)
     }
 
     /// Returns the limits with the position of their measure in [`Self::recorded`].
@@ -110,8 +110,8 @@ impl Plan {
     /// Refuses names of measures that are not recorded, and limits on measures that no case can
     /// have, because FMUs that the command line names lack the variables.
     fn check_limits(&self, measured: &Metrics) -> Result<(), Error> {
-        let Campaign { limits, keep, search, source, .. } = &self.campaign;
-        let referred = limits.iter().map(|limit| &limit.measure).chain(&keep.by);
+        let Campaign { limits, search, source, .. } = &self.campaign;
+        let referred = limits.iter().map(|limit| &limit.measure);
         let referred = referred.chain(search.as_ref().map(|search| &search.largest));
         let names = self.recorded.iter().map(|recorded| recorded.name.as_str());
         source.check_names(referred, "metric or measure", names)?;

@@ -155,7 +155,7 @@ pub(crate) fn keys(campaign: &Campaign, changes: &Changes) -> Result<String, Err
         .map_err(|error| campaign.source.error(&(0..0), error.to_string()))?;
     // These change neither the cases nor their recorded values. Experiment and FMUs count by their
     // content, wherever they are.
-    for key in ["title", "description", "extends", "experiment", "fmu", "keep", "search"] {
+    for key in ["title", "description", "extends", "experiment", "fmu", "search"] {
         table.remove(key);
     }
     if campaign.design != DesignKind::Corners {

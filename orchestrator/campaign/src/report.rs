@@ -4,17 +4,14 @@
 mod figures;
 
 use crate::cloud;
-use crate::findings::{Findings, LimitFinding, Measured, chosen, worst};
-use crate::flight::Flight;
+use crate::findings::{Findings, LimitFinding, Measured, worst};
 use crate::plan::Plan;
 use crate::sensitivity::{Estimate, Sensitivity};
 use cosim::error::Error;
 use cosim::files;
-use cosim::interrupt::Interrupt;
 use cosim_report::figure::{Figure, with_unit};
 use cosim_report::page::{Page, Section, figure, paragraphs, table, verdict};
 use maud::{Markup, html};
-use std::collections::BTreeSet;
 use std::path::Path;
 use sweep::runner::Options;
 use sweep::statistics::{Probability, Summary};
@@ -26,7 +23,7 @@ use sweep::vary::DesignKind;
 /// Number of the worst cases that the page shows.
 const SHOWN: usize = 5;
 
-/// Writes `report.html`, and the full results of the cases that are kept.
+/// Writes `report.html`.
 ///
 /// # Errors
 /// Returns an error if a file cannot be written, or if the work was asked to end.
@@ -37,56 +34,29 @@ pub fn write(
     out: &Path,
     options: &Options,
 ) -> Result<(), Error> {
-    let kept_cases = chosen(plan, cases);
-    keep(plan, &kept_cases, out, &options.interrupt)?;
-    let ranking = ranking(plan);
-    let ranked = match &ranking {
-        Some(name) => worst(&cases.numbers(name), SHOWN),
-        None => Vec::new(),
-    };
+    let ranked = ranking(plan).map(|name| (name, worst(&cases.numbers(name), SHOWN)));
     let histograms = figures::distributions(plan, cases);
     let mut pictures: Vec<Figure> = histograms.into_iter().collect();
     pictures.extend(figures::scatters(plan, cases));
-    if let Some(worst) = ranked.first() {
+    if let Some(worst) = ranked.as_ref().and_then(|(_, cases)| cases.first()) {
         let (name, values) = (format!("case {worst}"), plan.sweep.values(*worst));
         pictures.extend(cloud::draw(plan, &name, (*worst, &values), findings.cases, options)?);
     }
-    let page = page(plan, findings, &pictures, &kept_cases, ranking.zip(Some(ranked)).as_ref());
+    let page = page(plan, findings, &pictures, ranked);
     files::write(&out.join("report.html"), page)
 }
 
-/// Returns the measure that orders the cases: the one that is asked for, or that of the first
-/// limit.
-fn ranking(plan: &Plan) -> Option<String> {
-    let by = plan.campaign.keep.by.as_ref().map(|by| by.get_ref().clone());
-    let limited = || plan.campaign.limits.first().map(|limit| limit.measure.get_ref().clone());
-    by.or_else(limited).or_else(|| plan.recorded.first().map(|recorded| recorded.name.clone()))
-}
-
-/// Flies cases again and writes their full results.
-fn keep(
-    plan: &Plan,
-    cases: &BTreeSet<u64>,
-    out: &Path,
-    interrupt: &Interrupt,
-) -> Result<(), Error> {
-    let system = Flight::new(plan, false, interrupt)?.system().clone();
-    for case in cases {
-        let folder = out.join("cases").join(case.to_string());
-        let (title, _) = plan.write_case(*case, &folder)?;
-        // The flight is over, and its instances are freed, where it was begun.
-        let fly = || Flight::new(plan, false, interrupt)?.keep(*case, &folder, &title);
-        system.apart(interrupt, &[&folder], fly)?;
-    }
-    Ok(())
+/// Returns the measure that orders the cases: that of the first limit, or the first one.
+fn ranking(plan: &Plan) -> Option<&str> {
+    let limited = plan.campaign.limits.first().map(|limit| limit.measure.get_ref());
+    limited.or(plan.recorded.first().map(|recorded| &recorded.name)).map(String::as_str)
 }
 
 fn page(
     plan: &Plan,
     findings: &Findings,
     figures: &[Figure],
-    kept_cases: &BTreeSet<u64>,
-    ranked: Option<&(String, Vec<u64>)>,
+    ranked: Option<(&str, Vec<u64>)>,
 ) -> String {
     let campaign = &plan.campaign;
     let experiment = &plan.sweep.experiment().title;
@@ -105,30 +75,18 @@ fn page(
             Section::new("measures", "Measures", measures(&findings.measures)),
             Section::new("figures", "Figures", figures).headed(""),
             Section::new("sensitivity", "Sensitivity", sensitivity),
-            Section::new("worst", "Worst cases", worst_cases(plan, kept_cases, ranked)),
+            Section::new("worst", "Worst cases", worst_cases(plan, ranked)),
             Section::new("varied", "Varied parameters", varied(plan)),
         ],
     };
     page.text()
 }
 
-fn worst_cases(
-    plan: &Plan,
-    kept_cases: &BTreeSet<u64>,
-    ranked: Option<&(String, Vec<u64>)>,
-) -> Markup {
+fn worst_cases(plan: &Plan, ranked: Option<(&str, Vec<u64>)>) -> Markup {
     html! {
         @if let Some((name, cases)) = ranked {
             p { "These cases have the largest values of " code { (name) } ", in descending order. Each command runs a case again and records all of its variables:" }
             ul { @for case in cases { li { code { (plan.changes.command.replace("CASE", &case.to_string())) } } } }
-        }
-        @if !kept_cases.is_empty() {
-            p {
-                "The folder " code { "cases" } " holds the full results of "
-                (if kept_cases.len() == 1 { "case " } else { "the cases " })
-                @for (i, case) in kept_cases.iter().take(200).enumerate() { @if i > 0 { ", " } (case) }
-                @if kept_cases.len() > 200 { ", …" }
-            }
         }
     }
 }

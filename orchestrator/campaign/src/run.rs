@@ -172,7 +172,7 @@ fn fly_parts(
     let interrupt = &options.interrupt;
     let system = plan.sweep.system(&mut Opened::default())?;
     let try_it = || can_reset(&plan.sweep, &mut Opened::default(), interrupt);
-    let resets = system.apart(interrupt, &[], try_it).map_err(|error| of_case(0, error))?;
+    let resets = system.apart(interrupt, try_it).map_err(|error| of_case(0, error))?;
     let threads = runner::threads(options.jobs, [&plan.sweep]);
     work.fly(
         missing,

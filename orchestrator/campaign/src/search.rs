@@ -111,7 +111,7 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
     let system = plan.sweep.system(&mut Opened::default())?;
     let quiet = options.quiet || system.is_closed;
     let look = || look_in_threads(plan, search, measure, (options, quiet));
-    let Found { searches, ended, tried } = system.apart(&options.interrupt, &[], look)?;
+    let Found { searches, ended, tried } = system.apart(&options.interrupt, look)?;
     let worst = tried.iter().filter(|case| !case.value.is_nan());
     let worst = worst.max_by(|a, b| a.value.total_cmp(&b.value)).or(tried.first());
     let worst = worst.ok_or_else(|| Single::experiment("no case was flown"))?;

@@ -9,7 +9,7 @@ use fmu_import::isolation::{Closed, Closing, Ended};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 impl System {
     /// Returns what the closed process of the instances may use; `None` if they run in this one.
@@ -28,19 +28,16 @@ impl System {
         self.is_closed.then(|| Closing { folders, files, ..self.experiment.isolation.closing() })
     }
 
-    /// Does work with the instances where they are to run: in a closed process, which may also
-    /// write in these folders, or in this one.
+    /// Does work with the instances where they are to run: in a closed process, or in this one.
     ///
     /// # Errors
     /// Returns the error of the work, or that of an instance which ends or stops the process.
     pub fn apart<T: Serialize + DeserializeOwned>(
         &self,
         interrupt: &Interrupt,
-        folders: &[&Path],
         work: impl FnOnce() -> Result<T, Error>,
     ) -> Result<T, Error> {
-        let Some(mut closing) = self.closing() else { return work() };
-        closing.folders.extend(folders.iter().map(PathBuf::from));
+        let Some(closing) = self.closing() else { return work() };
         let mut outcome = None;
         let hear = |message| {
             outcome = Some(message);
