@@ -192,7 +192,7 @@ def corrupt_part(trial: Trial, chance: random.Random) -> None:
     content = bytearray(part.read_bytes())
     if chance.random() < 0.3:
         part.write_bytes(content[: chance.randrange(len(content))])
-        trial.must_be_true(trial.call(), "their files are damaged: 1 part")
+        trial.must_be_true(trial.call(), "their files are damaged (1 part)")
         return
     for _ in range(chance.randrange(1, 5)):
         content[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
@@ -206,7 +206,7 @@ def doubled_cases(trial: Trial, chance: random.Random) -> None:
     parts = trial.keep(trial.seed)
     first, second = chance.sample([part for part in parts if "0050" not in part.name[:10]], 2)
     shutil.copy(first, second)
-    trial.must_be_true(trial.call(), "their files are damaged: 1 part")
+    trial.must_be_true(trial.call(), "their files are damaged (1 part)")
 
 
 def killed_program(trial: Trial, chance: random.Random) -> None:

@@ -135,7 +135,7 @@ pub fn table(plan: &Plan, rows: &[Row]) -> CaseTable {
     let mut columns = columns(&plan.sweep, &cases);
     for (place, recorded) in plan.recorded.iter().enumerate() {
         let values = rows.iter().map(|row| row.numbers[place]).collect();
-        columns.push(Column { name: recorded.name.clone(), values: Values::Optional(values) });
+        columns.push(Column { name: recorded.name.clone(), values: Values::Real(values) });
     }
     for (place, limit) in plan.campaign.limits.iter().enumerate() {
         let values = rows.iter().map(|row| row.limits_kept[place]).collect();
@@ -143,7 +143,7 @@ pub fn table(plan: &Plan, rows: &[Row]) -> CaseTable {
     }
     let text = |text: fn(&Row) -> String| Values::Text(rows.iter().map(text).collect());
     columns.push(Column { name: "status".into(), values: text(|row| row.status.name().into()) });
-    let times = rows.iter().map(|row| row.time).collect();
+    let times = rows.iter().map(|row| Some(row.time)).collect();
     columns.push(Column { name: "time".into(), values: Values::Real(times) });
     columns.push(Column { name: "message".into(), values: text(|row| row.message.clone()) });
     CaseTable { columns }

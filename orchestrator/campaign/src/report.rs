@@ -6,7 +6,7 @@ mod figures;
 use crate::cloud;
 use crate::findings::{Findings, LimitFinding, Measured, worst};
 use crate::plan::Plan;
-use crate::sensitivity::{Estimate, Sensitivity};
+use crate::sensitivity::Sensitivity;
 use cosim::error::Error;
 use cosim::files;
 use cosim_report::figure::{Figure, with_unit};
@@ -236,17 +236,15 @@ fn bar(value: f64) -> Markup {
 
 /// Returns the parameters in the order of their weight, as bars.
 fn tornado(measure: &Measured) -> Markup {
-    let weight =
-        |row: &Sensitivity| row.rank_correlation.map_or(0.0, |estimate| estimate.value.abs());
+    let weight = |row: &Sensitivity| row.rank_correlation.map_or(0.0, f64::abs);
     let mut rows: Vec<&Sensitivity> =
         measure.sensitivities.iter().filter(|row| row.rank_correlation.is_some()).collect();
     rows.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
-    let text = |value: f64| format!("{value:.3}").replace('-', "−");
     let cells = rows.iter().take(20).filter_map(|row| {
-        let Estimate { value, low, high } = row.rank_correlation?;
+        let value = row.rank_correlation?;
         Some(vec![
             html! { code { (row.parameter) } },
-            with_interval(&text(value), Some([low, high].map(text))),
+            html! { (format!("{value:.3}").replace('-', "−")) },
             bar(value),
             html! { (row.p_value.map_or(String::new(), chance)) },
         ])
@@ -266,7 +264,7 @@ fn sensitivity_note(plan: &Plan) -> Markup {
     html! {
         p.note {
             "Spearman's rank correlation is 1 or −1 if the measure only rises or only falls with the parameter. "
-            "A small p-value says that a correlation this large would hardly arise by chance. The 95 % interval of a number is below it. "
+            "A small p-value says that a correlation this large would hardly arise by chance. "
             @if !seeds.is_empty() {
                 "The seeds (" (seeds.join(", ")) ") have no sensitivity, because their order has no meaning."
             }

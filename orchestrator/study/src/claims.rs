@@ -198,7 +198,7 @@ mod tests {
 
     /// Returns a table with the values of a measure.
     fn measured(id: &str, values: &[Option<f64>]) -> CaseTable {
-        let values = Values::Optional(values.to_vec());
+        let values = Values::Real(values.to_vec());
         CaseTable { columns: vec![Column { name: format!("measure.{id}"), values }] }
     }
 

@@ -54,8 +54,8 @@ fn values(cells: &[Option<&Value>]) -> Values {
     if let Some(flags) = flags.collect() {
         Values::Flag(flags)
     } else if let Some(counts) = counts.collect() {
-        Values::Count(counts)
+        Values::Integer(counts)
     } else {
-        Values::Optional(cells.iter().map(|cell| cell.and_then(Value::number)).collect())
+        Values::Real(cells.iter().map(|cell| cell.and_then(Value::number)).collect())
     }
 }

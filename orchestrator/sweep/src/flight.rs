@@ -274,7 +274,7 @@ impl Observer for Watch<'_> {
 pub fn columns(sweep: &Sweep, cases: &[(u64, &[SettingValue])]) -> Vec<Column> {
     let mut columns = vec![Column {
         name: "case".into(),
-        values: Values::Count(cases.iter().map(|(case, _)| case.cast_signed()).collect()),
+        values: Values::Integer(cases.iter().map(|(case, _)| case.cast_signed()).collect()),
     }];
     for (place, varied) in sweep.varied.iter().enumerate() {
         let values = cases.iter().map(|(_, values)| &values[place]);
@@ -286,11 +286,9 @@ pub fn columns(sweep: &Sweep, cases: &[(u64, &[SettingValue])]) -> Vec<Column> {
 fn typed<'a>(kind: &Type, values: impl Iterator<Item = &'a SettingValue>) -> Values {
     let values = values.map(SettingValue::to_json);
     match kind {
-        Type::Real { .. } => {
-            Values::Real(values.map(|value| value.as_f64().unwrap_or(f64::NAN)).collect())
-        }
+        Type::Real { .. } => Values::Real(values.map(|value| value.as_f64()).collect()),
         Type::Integer { .. } => {
-            Values::Integer(values.map(|value| value.as_i64().unwrap_or(0) as i32).collect())
+            Values::Integer(values.map(|value| value.as_i64().unwrap_or(0)).collect())
         }
         Type::Boolean => Values::Flag(values.map(|value| value == true).collect()),
         _ => Values::Text(values.map(|value| value.as_str().unwrap_or_default().into()).collect()),

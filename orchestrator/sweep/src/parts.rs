@@ -45,19 +45,6 @@ pub struct PartResult {
     pub curves: String,
 }
 
-/// State of a part's file in the folder of the results.
-#[derive(Clone, Debug, PartialEq)]
-pub enum PartState {
-    /// The file is valid.
-    Whole(PartResult),
-    /// There is no such file.
-    Missing,
-    /// The file is damaged.
-    Damaged,
-    /// The file was made from other inputs, whose names are given.
-    Other(Vec<String>),
-}
-
 impl Store<'_> {
     /// Returns the path of a part's file.
     fn path(&self, part: &Range<u64>) -> PathBuf {
@@ -65,24 +52,26 @@ impl Store<'_> {
     }
 
     /// Looks for a part.
-    pub fn find(&self, part: &Range<u64>) -> PartState {
+    ///
+    /// # Errors
+    /// Returns why the part is to be flown, in words if its file is of no use; `None` if there is no
+    /// such file.
+    pub fn find(&self, part: &Range<u64>) -> Result<PartResult, Option<String>> {
         let path = self.path(part);
         if !path.exists() {
-            return PartState::Missing;
+            return Err(None);
         }
-        let Some((stored, result)) = fs::read(&path).ok().and_then(|bytes| decoded(&bytes)) else {
-            return PartState::Damaged;
-        };
+        let damaged = || Some("their files are damaged".to_string());
+        let decoded = fs::read(&path).ok().and_then(|bytes| decoded(&bytes));
+        let (stored, result) = decoded.ok_or_else(damaged)?;
         let differing = self.keys.iter().filter(|(name, key)| stored.get(*name) != Some(key));
         let superfluous = stored.iter().filter(|(name, _)| !self.keys.contains_key(*name));
-        let others: Vec<String> =
-            differing.chain(superfluous).map(|(name, _)| name.clone()).collect();
-        match others.is_empty() {
-            false => PartState::Other(others),
-            // A file may have been renamed.
-            true if !result.rows.has_cases(part) => PartState::Damaged,
-            true => PartState::Whole(result),
+        let others: Vec<&str> = differing.chain(superfluous).map(|(name, _)| &**name).collect();
+        if !others.is_empty() {
+            return Err(Some(format!("this has changed: {}", others.join(", "))));
         }
+        // A file may have been renamed.
+        if result.rows.has_cases(part) { Ok(result) } else { Err(damaged()) }
     }
 
     /// Reads a part that was found to be whole.
@@ -90,13 +79,12 @@ impl Store<'_> {
     /// # Errors
     /// Returns an error if the file has been removed, damaged or replaced by another one since.
     pub fn read(&self, part: &Range<u64>) -> Result<PartResult, Error> {
-        match self.find(part) {
-            PartState::Whole(result) => Ok(result),
-            _ => Err(Error::experiment(format!(
+        self.find(part).map_err(|_| {
+            Error::experiment(format!(
                 "{} was changed while it was in use: the same command flies its cases again",
                 self.path(part).display()
-            ))),
-        }
+            ))
+        })
     }
 
     /// Keeps the results of a part, with the hashes of all its inputs.
@@ -125,38 +113,6 @@ fn decoded(bytes: &[u8]) -> Option<(BTreeMap<String, String>, PartResult)> {
     postcard::from_bytes(content).ok()
 }
 
-/// Sorts the states of the missing parts into remarks for the user.
-#[derive(Debug, Default)]
-pub struct Remarks {
-    damaged: u64,
-    others: BTreeMap<String, u64>,
-}
-
-impl Remarks {
-    /// Returns whether a part is there, and notes why its file is of no use.
-    pub fn take(&mut self, state: PartState) -> bool {
-        match state {
-            PartState::Whole(_) => return true,
-            PartState::Missing => {}
-            PartState::Damaged => self.damaged += 1,
-            PartState::Other(names) => *self.others.entry(names.join(", ")).or_default() += 1,
-        }
-        false
-    }
-
-    /// Returns the remarks in words.
-    pub fn texts(&self) -> Vec<String> {
-        let parts = |count| format!("{count} part{}", if count == 1 { "" } else { "s" });
-        let damaged = (self.damaged > 0).then(|| {
-            format!("flown again because their files are damaged: {}", parts(self.damaged))
-        });
-        let others = self.others.iter().map(|(what, count)| {
-            format!("flown again because this has changed: {what} ({})", parts(*count))
-        });
-        damaged.into_iter().chain(others).collect()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -178,8 +134,8 @@ mod tests {
     #[test]
     fn no_changed_byte_goes_unseen() {
         let columns = vec![
-            Column { name: "case".into(), values: Values::Count(vec![0, 1]) },
-            Column { name: "largest".into(), values: Values::Optional(vec![Some(0.1), None]) },
+            Column { name: "case".into(), values: Values::Integer(vec![0, 1]) },
+            Column { name: "largest".into(), values: Values::Real(vec![Some(0.1), None]) },
             Column { name: "status".into(), values: Values::Text(vec!["x".into(), "y".into()]) },
         ];
         let result = PartResult { rows: CaseTable { columns }, curves: "{\"time\":[0.1]}".into() };
@@ -190,19 +146,20 @@ mod tests {
         store.write(&part, &result).unwrap();
         let path = store.path(&part);
         let sound = fs::read(&path).unwrap();
-        assert_eq!(store.find(&part), PartState::Whole(result.clone()));
+        let damaged = || Err(Some("their files are damaged".into()));
+        assert_eq!(store.find(&part), Ok(result.clone()));
         for byte in 0..sound.len() {
             let mut broken = sound.clone();
             broken[byte] ^= 0x10;
             fs::write(&path, &broken).unwrap();
-            assert_eq!(store.find(&part), PartState::Damaged, "byte {byte}");
+            assert_eq!(store.find(&part), damaged(), "byte {byte}");
             fs::write(&path, &sound[..byte]).unwrap();
-            assert_eq!(store.find(&part), PartState::Damaged, "{byte} bytes");
+            assert_eq!(store.find(&part), damaged(), "{byte} bytes");
         }
         // The same bytes are not those of another part of this length.
         fs::write(store.path(&(2..4)), &sound).unwrap();
-        assert_eq!(store.find(&(2..4)), PartState::Damaged);
-        let twice = Values::Count(vec![0, 0]);
+        assert_eq!(store.find(&(2..4)), damaged());
+        let twice = Values::Integer(vec![0, 0]);
         let mut doubled = result.clone();
         doubled.rows.columns[0].values = twice;
         let error = store.write(&part, &doubled).unwrap_err().to_string();
@@ -210,6 +167,6 @@ mod tests {
         let other = BTreeMap::from([("experiment".to_string(), "abd".to_string())]);
         fs::write(&path, &sound).unwrap();
         let changed = Store { folder: folder.path().to_path_buf(), keys: &other };
-        assert_eq!(changed.find(&part), PartState::Other(vec!["experiment".to_string()]));
+        assert_eq!(changed.find(&part), Err(Some("this has changed: experiment".into())));
     }
 }

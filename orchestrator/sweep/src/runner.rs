@@ -4,13 +4,14 @@
 use crate::cases::Sweep;
 use crate::closed;
 use crate::error::Error;
-use crate::parts::{PartResult, Remarks, Store};
+use crate::parts::{PartResult, Store};
 use crate::threads::{Worked, on_parts};
 use cosim::error::Error as Single;
 use cosim::interrupt::Interrupt;
 use cosim::system::System;
 use cosim_metrics::progress::Parts;
 use fmu_import::isolation::Ended;
+use std::collections::BTreeMap;
 use std::num::NonZero;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -71,15 +72,22 @@ impl<'a> Work<'a> {
     /// Looks for these parts, and returns the missing ones.
     pub fn missing(&mut self, parts: impl IntoIterator<Item = Part>) -> Vec<Part> {
         let mut missing = Vec::new();
-        let mut remarks = Remarks::default();
+        let mut reasons: BTreeMap<String, u64> = BTreeMap::new();
         for part in parts {
-            if remarks.take(self.stores[part.sweep].find(&part.cases)) {
-                self.cases += part.count();
-            } else {
-                missing.push(part);
+            match self.stores[part.sweep].find(&part.cases) {
+                Ok(_) => self.cases += part.count(),
+                Err(reason) => {
+                    missing.push(part);
+                    if let Some(reason) = reason {
+                        *reasons.entry(reason).or_default() += 1;
+                    }
+                }
             }
         }
-        self.notes.extend(remarks.texts());
+        self.notes.extend(reasons.into_iter().map(|(reason, count)| {
+            let s = if count == 1 { "" } else { "s" };
+            format!("flown again because {reason} ({count} part{s})")
+        }));
         missing
     }
 

@@ -12,14 +12,10 @@ use std::path::Path;
 /// Values of a column.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Values {
-    /// Real numbers.
-    Real(Vec<f64>),
     /// Real numbers, some of which may be missing.
-    Optional(Vec<Option<f64>>),
-    /// Whole numbers, such as that of a case.
-    Count(Vec<i64>),
-    /// Integers of an FMU.
-    Integer(Vec<i32>),
+    Real(Vec<Option<f64>>),
+    /// Whole numbers.
+    Integer(Vec<i64>),
     /// Truth values.
     Flag(Vec<bool>),
     /// Texts, such as items of an enumeration.
@@ -31,8 +27,6 @@ macro_rules! for_any {
     ($column:expr, $values:ident => $result:expr) => {
         match $column {
             Values::Real($values) => $result,
-            Values::Optional($values) => $result,
-            Values::Count($values) => $result,
             Values::Integer($values) => $result,
             Values::Flag($values) => $result,
             Values::Text($values) => $result,
@@ -60,10 +54,8 @@ impl Values {
     /// Returns a value as a number, with 1 and 0 for yes and no; `None` if it is missing or a text.
     pub fn number(&self, row: usize) -> Option<f64> {
         match self {
-            Self::Real(values) => Some(values[row]),
-            Self::Optional(values) => values[row],
-            Self::Count(values) => Some(values[row] as f64),
-            Self::Integer(values) => Some(f64::from(values[row])),
+            Self::Real(values) => values[row],
+            Self::Integer(values) => Some(values[row] as f64),
             Self::Flag(values) => Some(f64::from(u8::from(values[row]))),
             Self::Text(_) => None,
         }
@@ -78,8 +70,6 @@ impl Values {
     fn append(&mut self, other: Self) {
         match (self, other) {
             (Self::Real(values), Self::Real(more)) => values.extend(more),
-            (Self::Optional(values), Self::Optional(more)) => values.extend(more),
-            (Self::Count(values), Self::Count(more)) => values.extend(more),
             (Self::Integer(values), Self::Integer(more)) => values.extend(more),
             (Self::Flag(values), Self::Flag(more)) => values.extend(more),
             (Self::Text(values), Self::Text(more)) => values.extend(more),
@@ -127,7 +117,7 @@ impl CaseTable {
 
     /// Returns whether the rows are those of these cases, in order.
     pub fn has_cases(&self, cases: &Range<u64>) -> bool {
-        let Some(Values::Count(numbers)) = self.column("case") else { return false };
+        let Some(Values::Integer(numbers)) = self.column("case") else { return false };
         numbers.iter().map(|number| number.cast_unsigned()).eq(cases.clone())
     }
 

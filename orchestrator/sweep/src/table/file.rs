@@ -55,10 +55,8 @@ fn begin(
     let mut fields = Vec::new();
     for column in &table.columns {
         let (physical, repetition) = match column.values {
-            Values::Real(_) => (Physical::DOUBLE, Repetition::REQUIRED),
-            Values::Optional(_) => (Physical::DOUBLE, Repetition::OPTIONAL),
-            Values::Count(_) => (Physical::INT64, Repetition::REQUIRED),
-            Values::Integer(_) => (Physical::INT32, Repetition::REQUIRED),
+            Values::Real(_) => (Physical::DOUBLE, Repetition::OPTIONAL),
+            Values::Integer(_) => (Physical::INT64, Repetition::REQUIRED),
             Values::Flag(_) => (Physical::BOOLEAN, Repetition::REQUIRED),
             Values::Text(_) => (Physical::BYTE_ARRAY, Repetition::REQUIRED),
         };
@@ -86,17 +84,11 @@ fn write_values(
 ) -> Result<usize, ParquetError> {
     match (values, writer) {
         (Values::Real(values), ColumnWriter::DoubleColumnWriter(writer)) => {
-            writer.write_batch(&values[rows], None, None)
-        }
-        (Values::Optional(values), ColumnWriter::DoubleColumnWriter(writer)) => {
             let present: Vec<f64> = values[rows.clone()].iter().copied().flatten().collect();
             let levels: Vec<i16> = values[rows].iter().map(|v| i16::from(v.is_some())).collect();
             writer.write_batch(&present, Some(&levels), None)
         }
-        (Values::Count(values), ColumnWriter::Int64ColumnWriter(writer)) => {
-            writer.write_batch(&values[rows], None, None)
-        }
-        (Values::Integer(values), ColumnWriter::Int32ColumnWriter(writer)) => {
+        (Values::Integer(values), ColumnWriter::Int64ColumnWriter(writer)) => {
             writer.write_batch(&values[rows], None, None)
         }
         (Values::Flag(values), ColumnWriter::BoolColumnWriter(writer)) => {
