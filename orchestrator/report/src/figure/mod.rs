@@ -59,8 +59,6 @@ impl std::fmt::Display for Color {
 pub enum Legend {
     /// One legend for all panels, above them.
     Above,
-    /// One legend for each panel, to its right.
-    Beside,
     /// One legend for each panel, between its title and its axes.
     Each,
 }

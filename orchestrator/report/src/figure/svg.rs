@@ -17,18 +17,16 @@ use panel::{draw_panel, left_of};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Width of a figure, smallest width of a legend beside a panel, and height of a panel, px.
+/// Width of a figure, and height of a panel, px.
 const WIDTH: f64 = 1000.0;
-const LEGEND_WIDTH: f64 = 110.0;
 const HEIGHT: f64 = 250.0;
 /// Height of a title of one line, of each further line, and of a row of the legend above the
 /// panels, px.
 const TITLE_HEIGHT: f64 = 34.0;
 const TITLE_LINE: f64 = 22.0;
 const LEGEND_HEIGHT: f64 = 22.0;
-/// Largest number of letters of a line of the title, and of a name in a legend beside a panel.
+/// Largest number of letters of a line of the title, and of a name in a legend.
 const TITLE_LETTERS: usize = 100;
-const NAME_LETTERS: usize = 36;
 /// Largest number of lines of the title.
 const TITLE_LINES: usize = 4;
 /// Width of a letter in the legend, and of the sample beside the name, px.
@@ -72,7 +70,7 @@ fn document(figure: &Figure, begin: &str, titled: bool, whole: f64) -> String {
         Legend::Above => {
             arrange(legend(figure.panels.iter().flat_map(|panel| &panel.curves)), whole)
         }
-        Legend::Beside | Legend::Each => Vec::new(),
+        Legend::Each => Vec::new(),
     };
     let title =
         if titled { wrapped(&figure.title, TITLE_LETTERS, TITLE_LINES) } else { Vec::new() };
@@ -95,7 +93,6 @@ fn document(figure: &Figure, begin: &str, titled: bool, whole: f64) -> String {
         );
     }
     draw_legend(&mut out, &lines, &shared, (64.0, title_height + 12.0));
-    let beside = if figure.legend == Legend::Beside { beside(&figure.panels) } else { 0.0 };
     // Axes over one another begin at the same place.
     let left = figure.panels.iter().map(|panel| left_of(panel, HEIGHT)).fold(0.0, f64::max);
     let mut top = above;
@@ -106,17 +103,10 @@ fn document(figure: &Figure, begin: &str, titled: bool, whole: f64) -> String {
         let is_named = below.is_none_or(|below| below.x_label != panel.x_label);
         let own = Dashes::new(std::slice::from_ref(panel));
         let dashes = if figure.legend == Legend::Above { &shared } else { &own };
-        let area =
-            Area { x, y: top, width: width - beside, height: row.height, legend: row.legend };
+        let area = Area { x, y: top, width, height: row.height, legend: row.legend };
         draw_panel(&mut out, panel, dashes, area, left, is_named);
         match figure.legend {
             Legend::Above => {}
-            Legend::Beside => {
-                for (line, curve) in legend(panel.curves.iter()).into_iter().enumerate() {
-                    let at = (x + area.width + 4.0, top + 18.0 + 19.0 * line as f64);
-                    entry(&mut out, curve, dashes, at, NAME_LETTERS);
-                }
-            }
             Legend::Each => {
                 let begin = top + panel::above(panel) + 11.0;
                 let lines = arrange(legend(panel.curves.iter()), width);
@@ -150,13 +140,6 @@ fn rows_of(figure: &Figure, columns: usize, width: f64) -> Vec<Row> {
     };
     let rows: Vec<Row> = figure.panels.chunks(columns).map(row).collect();
     if rows.is_empty() { vec![Row { height: HEIGHT, legend: 0.0 }] } else { rows }
-}
-
-/// Returns the width of the legends beside panels, which follows their longest name, px.
-fn beside(panels: &[Panel]) -> f64 {
-    let entries = panels.iter().flat_map(|panel| legend(panel.curves.iter()));
-    let longest = entries.map(|curve| letters(&curve.name).min(NAME_LETTERS)).max();
-    longest.map_or(0.0, |longest| LEGEND_WIDTH.max(38.0 + LETTER * longest as f64))
 }
 
 /// Returns the first curve of each name, for the legend. Straight lines have their names beside
@@ -194,15 +177,14 @@ fn draw_legend(out: &mut String, lines: &[Vec<&Curve>], dashes: &Dashes, (x, y):
     for (row, line) in lines.iter().enumerate() {
         let mut at = (x, y + LEGEND_HEIGHT * row as f64);
         for curve in line {
-            entry(out, curve, dashes, at, TITLE_LETTERS);
+            entry(out, curve, dashes, at);
             at.0 += entry_width(curve);
         }
     }
 }
 
-/// Draws an entry of a legend whose sample begins at this place, and whose name has room for this
-/// number of letters.
-fn entry(out: &mut String, curve: &Curve, dashes: &Dashes, (x, y): (f64, f64), room: usize) {
+/// Draws an entry of a legend whose sample begins at this place.
+fn entry(out: &mut String, curve: &Curve, dashes: &Dashes, (x, y): (f64, f64)) {
     let (name, paint) = (escaped(&curve.name), stroke(curve, dashes));
     let _ = write!(out, "<g class=\"entry\" data-name=\"{name}\">");
     let _ = match &curve.shape {
@@ -221,7 +203,7 @@ fn entry(out: &mut String, curve: &Curve, dashes: &Dashes, (x, y): (f64, f64), r
         }
         _ => write!(out, "<path d=\"M{x} {y}h28\" fill=\"none\" {paint}/>"),
     };
-    let text = escaped(&shortened(&curve.name, room));
+    let text = escaped(&shortened(&curve.name, TITLE_LETTERS));
     let _ = write!(out, "<text x=\"{}\" y=\"{}\">{text}</text></g>", x + 34.0, y + 4.5);
 }
 

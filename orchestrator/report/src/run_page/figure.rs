@@ -29,8 +29,7 @@ fn arranged(runs: &[Recording], panels: &[Panel], flights: Vec<figure::Panel>) -
         [run] => run.title.clone(),
         _ => numbered.collect::<Vec<_>>().join(", "),
     };
-    let (columns, legend) =
-        if flights.is_empty() { (1, Legend::Beside) } else { (2, Legend::Each) };
+    let (columns, legend) = (if flights.is_empty() { 1 } else { 2 }, Legend::Each);
     let over_time = panels.iter().map(|panel| drawn(runs, &names, panel));
     Figure { title, columns, legend, panels: flights.into_iter().chain(over_time).collect() }
 }

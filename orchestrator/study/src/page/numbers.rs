@@ -1,14 +1,11 @@
 //! Tables of numbers.
 
 use crate::comparisons::{ComparisonRow, ComparisonTable, Overview};
-use crate::definition::Study;
 use crate::results::{Numbers, Results};
 use crate::texts::{difference, several, signed};
 use crate::values::{Quantity, ValueKind};
-use cosim_report::figure::Color;
 use cosim_report::page::table;
 use maud::{Markup, html};
-use std::collections::BTreeSet;
 use sweep::texts::shown;
 
 /// Rows and columns of the table on the first screen.
@@ -73,21 +70,6 @@ pub(super) fn overview(overview: &Overview, results: &Results) -> Markup {
     rows(overview, results, &|numbers, _| several(numbers))
 }
 
-/// Returns the names that the figures draw in a colour: those of runs, and of lines through runs.
-fn names(study: &Study, color: Color) -> BTreeSet<&String> {
-    let panels =
-        study.figures.iter().flat_map(|figure| figure.panels.iter().map(move |p| (figure, p)));
-    let curves = panels.flat_map(|(figure, panel)| {
-        let lines = panel.lines_across();
-        // Signals with names of their own have colours of their own.
-        let is_by_run = panel.signals.is_empty() && lines.is_empty();
-        let runs = study.runs_of(figure, panel).filter(move |_| is_by_run);
-        let runs = runs.map(|run| (run.color, &run.label));
-        runs.chain(lines.iter().map(|line| (line.color, &line.label)))
-    });
-    curves.filter(|(other, _)| *other == color).map(|(_, name)| name).collect()
-}
-
 /// Returns the number that stands for all cases: their mean, or the one that is nearest to a limit.
 fn one(numbers: &Numbers, limit: Option<f64>) -> String {
     let largest = numbers.0.iter().copied().reduce(f64::max);
@@ -120,9 +102,7 @@ fn rows(
                     }
                     tr {
                         td {
-                            @if names(results.study, run.color).into_iter().eq([&run.label]) {
-                                span.swatch style=(format!("background:{}", run.color)) {} " "
-                            }
+                            span.swatch style=(format!("background:{}", run.color)) {} " "
                             (run.label)
                         }
                         @for (column, numbers) in overview.metrics.iter().zip(numbers) {
@@ -164,8 +144,26 @@ pub(super) fn all_values(results: &Results) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::definition::Study;
+    use cosim_report::figure::Color;
+    use std::collections::BTreeSet;
     use std::fs;
     use std::path::Path;
+
+    /// Returns the names that the figures draw in a colour: those of runs, and of lines through runs.
+    fn names(study: &Study, color: Color) -> BTreeSet<&String> {
+        let panels =
+            study.figures.iter().flat_map(|figure| figure.panels.iter().map(move |p| (figure, p)));
+        let curves = panels.flat_map(|(figure, panel)| {
+            let lines = panel.lines_across();
+            // Signals with names of their own have colours of their own.
+            let is_by_run = panel.signals.is_empty() && lines.is_empty();
+            let runs = study.runs_of(figure, panel).filter(move |_| is_by_run);
+            let runs = runs.map(|run| (run.color, &run.label));
+            runs.chain(lines.iter().map(|line| (line.color, &line.label)))
+        });
+        curves.filter(|(other, _)| *other == color).map(|(_, name)| name).collect()
+    }
 
     fn study(path: &Path) -> Study {
         Study::load(path).unwrap()
@@ -198,41 +196,5 @@ mod tests {
         let beyond = |values: &[f64]| is_beyond(&Numbers(values.to_vec()), Some(5.0));
         assert!(beyond(&[4.0, 5.1]) && !beyond(&[4.0, 5.0 + 1e-12]) && !beyond(&[]));
         assert!(!is_beyond(&Numbers(vec![9.0]), None));
-    }
-
-    #[test]
-    fn a_swatch_stands_beside_a_run_only_if_its_colour_names_this_run_in_the_figures() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("study.toml");
-        let swatches = |figure: &str| {
-            let text = format!(
-                r##"title = ""
-                paper = ""
-                summary = ""
-                values = []
-                run = [
-                    {{ id = "a", label = "light", color = "#e69f00", experiment = "x.toml" }},
-                    {{ id = "b", label = "heavy", color = "#e69f00", experiment = "x.toml" }},
-                ]
-                overview = [{{ title = "", runs = ["a", "b"], metrics = [{{ of = "x", label = "x" }}] }}]
-                {figure}"##
-            );
-            fs::write(&path, text).unwrap();
-            let study = study(&path);
-            let text = overview(&study.overviews[0], &Results::empty(&study)).into_string();
-            let rows =
-                text.split("<td>").filter(|cell| cell.contains("light") || cell.contains("heavy"));
-            rows.map(|cell| cell.contains("swatch")).collect::<Vec<_>>()
-        };
-        let figure = |runs: &str| {
-            format!(
-                r#"figure = [{{ id = "f", title = "", runs = [{runs}], panel = [{{ label = "x", signal = "a.b" }}] }}]"#
-            )
-        };
-        assert_eq!(swatches(&figure(r#""a""#)), [true, false]);
-        assert_eq!(swatches(&figure(r#""b""#)), [false, true]);
-        // In the same colour, the two could not be distinguished.
-        assert_eq!(swatches(&figure(r#""a", "b""#)), [false, false]);
-        assert_eq!(swatches(""), [false, false]);
     }
 }

@@ -87,22 +87,12 @@ fn frame(svg: &str) -> Vec<f64> {
 }
 
 #[test]
-fn a_legend_beside_a_panel_has_the_room_that_its_names_need() {
-    let drawn = |name: &str| {
-        let figure = figure(vec![curve(name, Shape::Line)], None);
-        text(&Figure { legend: Legend::Beside, ..figure })
-    };
-    let right = |svg: &str| frame(svg)[0] + frame(svg)[2];
-    assert_eq!(right(&drawn("p")), 876.0);
-    let long = drawn("plant.attitude.alpha, crmpc-robust");
-    assert!(long.contains(">plant.attitude.alpha, crmpc-robust<"), "{long}");
-    // As many letters as there are, and the sample before them, fit between axes and edge.
-    assert!(right(&long) + 38.0 + 34.0 * 7.0 < WIDTH, "{}", right(&long));
-    // A name beyond all measure is shortened, but a script still finds its curve by it.
+fn a_name_beyond_all_measure_is_shortened() {
     let name = "x".repeat(200);
-    let (svg, short) = (drawn(&name), format!(">{}…", "x".repeat(18)));
-    assert!(right(&svg) > 600.0 && svg.contains(&short) && svg.contains(&name), "{svg}");
-    assert_eq!(right(&drawn("")), 986.0);
+    let svg = text(&figure(vec![curve(&name, Shape::Line)], None));
+    // A script still finds its curve by the whole name.
+    let short = format!(">{}…{}<", "x".repeat(50), "x".repeat(49));
+    assert!(svg.contains(&short) && svg.contains(&name), "{svg}");
 }
 
 #[test]
