@@ -6,7 +6,7 @@ use crate::picture;
 use clap::Args;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
-use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
+use cosim_report::figure::{Color, Curve, Figure, Panel, Shape, svg};
 use fmi_master::quantity::rounded;
 use linear::Matrix;
 use linear::curves::{ResponseCurves, excluded};
@@ -147,22 +147,11 @@ fn figure(found: &Linearised, margins: &Margins) -> Result<Figure, Failure> {
     let ratio = Curve::new(&worst.signal, Color::CURVES[0], Shape::Line, curves.phase, curves.gain);
     let sensitivity =
         Curve::new("all together", Color::INK, Shape::Line, curves.frequency, curves.sensitivity);
-    let panel = |x_label: &str, y_label: &str, log_x, curves| Panel {
-        x_label: x_label.into(),
-        y_label: y_label.into(),
-        log_x,
-        curves,
-        ..Panel::default()
-    };
-    Ok(Figure {
-        title: format!("Return ratio and sensitivity at t = {} s", rounded(found.time)),
-        columns: 2,
-        legend: Legend::Above,
-        panels: vec![
-            panel("phase of L, deg", "|L|, dB", false, vec![excluded, ratio]),
-            panel("frequency, rad/s", "σ̄(S), dB", true, vec![sensitivity]),
-        ],
-    })
+    let title = format!("Return ratio and sensitivity at t = {} s", rounded(found.time));
+    let nichols = Panel::new("phase of L, deg", "|L|, dB", vec![excluded, ratio]);
+    let sensitivity =
+        Panel { log_x: true, ..Panel::new("frequency, rad/s", "σ̄(S), dB", vec![sensitivity]) };
+    Ok(Figure::new(title, 2, vec![nichols, sensitivity]))
 }
 
 fn write_table(margins: &Margins, out: &mut impl Write) -> Result<(), Failure> {

@@ -6,11 +6,11 @@ use crate::plan::Plan;
 use cosim::error::Error;
 use cosim::variation::SettingValue;
 use cosim_metrics::progress::Parts;
-use cosim_report::figure::{self, Color, Curve, Figure, Legend, Shape, with_unit};
+use cosim_report::figure::{self, Color, Curve, Figure, Shape, with_unit};
 use cosim_report::panels::{self, Panel};
 use sweep::closed;
 use sweep::runner::{self, Options};
-use sweep::threads::{Worked, on_parts};
+use sweep::threads::Worked;
 use sweep::track::Track;
 
 /// Number of cases that the band is made of.
@@ -58,23 +58,16 @@ pub(crate) fn draw(
         flight.fly_with(*case, values.clone(), &mut [&mut track])?;
         Ok(track)
     };
-    let Worked { results, failures } = if let Some(closing) = flight.system().closing() {
-        progress.draw_here();
-        let keep = |_: &_, track| {
-            progress.advance(1);
-            Ok(track)
-        };
-        let apart = (&closing, &options.interrupt);
-        let system = flight.system().clone();
-        let failed = |_: &_, ended| system.ended(ended, &options.interrupt);
-        closed::on_parts(&flights, threads, apart, begin, fly, keep, failed, |_| false)
-    } else {
-        let fly = |state: &mut _, flight: &_| {
-            progress.advance(1);
-            fly(state, flight)
-        };
-        on_parts(&flights, threads, begin, fly, |_| false)
+    progress.draw_here();
+    let (system, closing) = (flight.system().clone(), flight.system().closing());
+    let keep = |_: &_, track| {
+        progress.advance(1);
+        Ok(track)
     };
+    let failed = |_: &_, ended| system.ended(ended, &options.interrupt);
+    let apart = (closing.as_ref(), &options.interrupt);
+    let Worked { results, failures } =
+        closed::on_parts(&flights, threads, apart, begin, fly, keep, failed, |_| false);
     progress.finish();
     if let Some(error) = failures.into_values().next() {
         return Err(error);
@@ -88,21 +81,17 @@ pub(crate) fn draw(
         let scaled = |values: Vec<f64>| values.into_iter().map(|v| v * panel.factor).collect();
         let [low, median, high] = bands(&others, place, time.len()).map(scaled);
         let values = scaled(std::mem::take(&mut bad.values[place]));
-        figure::Panel {
-            x_label: "time, s".into(),
-            y_label: with_unit(&format!("{} {}", panel.label, curve.name), &panel.unit),
-            curves: vec![
-                Curve::new("5 % to 95 %", BAND, Shape::Band(high), time.clone(), low),
-                Curve::new("median", BAND, Shape::Line, time.clone(), median),
-                Curve::new(name, WORST, Shape::Line, bad.time.clone(), values),
-            ],
-            ..figure::Panel::default()
-        }
+        let curves = vec![
+            Curve::new("5 % to 95 %", BAND, Shape::Band(high), time.clone(), low),
+            Curve::new("median", BAND, Shape::Line, time.clone(), median),
+            Curve::new(name, WORST, Shape::Line, bad.time.clone(), values),
+        ];
+        let label = with_unit(&format!("{} {}", panel.label, curve.name), &panel.unit);
+        figure::Panel::new("time, s", &label, curves)
     });
-    let panels: Vec<_> = panels.collect();
     let title =
         format!("The worst case, over the median and the band of the first {} cases", others.len());
-    Ok(Some(Figure { title, columns: 3.min(panels.len()), legend: Legend::Above, panels }))
+    Ok(Some(Figure::new(title, 3, panels.collect())))
 }
 
 /// Returns the curves that are drawn, each with its panel.

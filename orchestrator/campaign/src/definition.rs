@@ -8,7 +8,7 @@ use cosim::error::Error;
 use cosim::experiment::Measure;
 use cosim::signal::Signal;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use sweep::vary::{DesignKind, Vary};
@@ -27,9 +27,6 @@ pub struct Campaign {
     /// Experiment whose cases are flown: a file beside this one, or the name of an experiment.
     #[schemars(with = "String")]
     pub experiment: Spanned<PathBuf>,
-    /// FMUs in place of those of the experiment, by component.
-    #[serde(default)]
-    pub fmu: BTreeMap<String, PathBuf>,
     /// Values of parameters that are the same in all cases, as `component.parameter`.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, cosim::experiment::Scalar>")]
@@ -67,7 +64,7 @@ pub struct Campaign {
 
 /// A limit on a measure, which each case keeps or breaks. A case that is lost, fails or ends early
 /// breaks all limits.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limit {
     /// Name of the limit in the results.
@@ -82,6 +79,20 @@ pub struct Limit {
     pub at_most: Option<f64>,
     /// Smallest value that keeps the limit, in the unit of the measure.
     pub at_least: Option<f64>,
+}
+
+impl Limit {
+    /// Returns the bound, and whether values must not be above it.
+    pub fn bound(&self) -> (f64, bool) {
+        let least = || (self.at_least.unwrap_or(f64::NAN), false);
+        self.at_most.map_or_else(least, |most| (most, true))
+    }
+
+    /// Returns whether a number keeps the limit.
+    pub fn is_kept(&self, number: f64) -> bool {
+        let (bound, is_upper) = self.bound();
+        if is_upper { number <= bound } else { number >= bound }
+    }
 }
 
 /// A search for the worst case.
@@ -168,7 +179,7 @@ impl Campaign {
     fn check_limit(&self, limit: &Limit) -> Result<(), Error> {
         let problem = if limit.at_most.is_some() == limit.at_least.is_some() {
             "one of at_most and at_least is needed"
-        } else if !limit.at_most.or(limit.at_least).is_some_and(f64::is_finite) {
+        } else if !limit.bound().0.is_finite() {
             "the limit is not a finite number"
         } else {
             return Ok(());

@@ -104,10 +104,8 @@ fn says(plan: &Plan, limit: &Limit) -> String {
     let name = limit.measure.get_ref();
     let measure = plan.recorded.iter().find(|recorded| recorded.name == *name);
     let unit = measure.map(|measure| measure.unit.as_str()).unwrap_or_default();
-    let (sign, bound) = match (limit.at_most, limit.at_least) {
-        (Some(most), _) => ("≤", most),
-        (None, least) => ("≥", least.unwrap_or(f64::NAN)),
-    };
+    let (bound, is_upper) = limit.bound();
+    let sign = if is_upper { "≤" } else { "≥" };
     format!("{} {sign} {bound} {unit}", plan.words(name)).trim_end().to_string()
 }
 

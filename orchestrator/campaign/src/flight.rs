@@ -117,13 +117,9 @@ impl<'a> Flight<'a> {
             self.plan.recorded.iter().map(|recorded| metrics.number(&recorded.name)).collect();
         let limits_kept = self.plan.limits().map(|(limit, place)| {
             let number = numbers[place].or(self.plan.recorded[place].missing);
-            let within = number.is_some_and(|number| {
-                limit.at_most.is_none_or(|most| number <= most)
-                    && limit.at_least.is_none_or(|least| number >= least)
-            });
             // Whether a case that ended early would have kept its other limits is not known: it
             // counts as breaking them.
-            within && status == CaseStatus::Completed
+            number.is_some_and(|number| limit.is_kept(number)) && status == CaseStatus::Completed
         });
         Ok(Row { case, values, limits_kept: limits_kept.collect(), numbers, status, time, message })
     }

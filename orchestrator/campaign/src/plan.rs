@@ -53,7 +53,8 @@ impl Plan {
         let meters = Meters::new(&mut system)?;
         let recorded = recorded(&campaign, &system.experiment.observe, &meters);
         let measured = meters.metrics();
-        sweep.keys.insert("campaign".into(), keys(&campaign, &changes)?);
+        let key = keys(&campaign, &sweep.experiment().observe, &changes);
+        sweep.keys.insert("campaign".into(), key);
         let plan = Self { campaign, sweep, recorded, changes };
         plan.check_columns()?;
         plan.check_limits(&measured)?;

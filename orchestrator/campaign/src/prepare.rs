@@ -6,6 +6,7 @@ use cosim::experiment::{Experiment, Margins, Measure, MeasureKind, Observe, Over
 use cosim::files;
 use cosim::search::named::{Kind, find};
 use cosim_metrics::metrics::{Meters, Metrics};
+use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use sweep::vary::DesignKind;
@@ -48,15 +49,6 @@ pub(crate) fn read_experiment(campaign: &Campaign, changes: &Changes) -> Result<
             .map_err(|error| source.error(&span, error.to_string()))?,
     };
     let mut experiment = Experiment::load(&path)?;
-    let mut overrides = Overrides::default();
-    for (component, fmu) in &campaign.fmu {
-        let beside = source.beside(fmu);
-        let file = if beside.is_file() { beside } else { fmu.clone() };
-        overrides.fmu.push(format!("{component}={}", file.display()));
-    }
-    experiment.apply(&overrides)?;
-    // A fault of these is that of the campaign's file, not of an option.
-    experiment.given = Overrides::default();
     for (name, value) in &campaign.set {
         let outcome = experiment.set(name, value.get_ref().clone());
         outcome.map_err(|problem| source.error(&value.span(), format!("[set] {problem}")))?;
@@ -149,22 +141,14 @@ fn missing(name: &str, observe: &Observe) -> Option<f64> {
     }
 }
 
-/// Hashes what the campaign and the command line say about the cases.
-pub(crate) fn keys(campaign: &Campaign, changes: &Changes) -> Result<String, Error> {
-    let mut table: toml::Table = toml::from_str(campaign.source.whole())
-        .map_err(|error| campaign.source.error(&(0..0), error.to_string()))?;
-    // These change neither the cases nor their recorded values. Experiment and FMUs count by their
-    // content, wherever they are.
-    for key in ["title", "description", "extends", "experiment", "fmu", "search"] {
-        table.remove(key);
-    }
-    if campaign.design != DesignKind::Corners {
-        table.remove("cases");
-    }
-    let text = toml::to_string(&table).map_err(|error| Error::experiment(error.to_string()))?;
-    // FMUs count by their content here as well, and it is the same for a case in which process its
-    // instances run.
+/// Hashes what the campaign and the command line say about the cases. Experiment and FMUs count by
+/// their content, wherever they are.
+pub(crate) fn keys(campaign: &Campaign, observe: &Observe, changes: &Changes) -> String {
+    let Campaign { set, vary, design, seed, cases, limits, .. } = campaign;
+    let cases = cases.filter(|_| *design == DesignKind::Corners);
+    let inputs = json!([set, vary, design, seed, cases, limits, observe]);
+    // It is the same for a case in which process its instances run.
     let process = Process::default();
     let overrides = Overrides { fmu: Vec::new(), process, ..changes.overrides.clone() };
-    Ok(files::digest(format!("{text}{overrides:?}")))
+    files::digest(format!("{inputs}{overrides:?}"))
 }

@@ -191,10 +191,5 @@ fn fly_parts(
 
 /// Names the case in which an FMU could not be flown.
 fn of_case(case: u64, error: Single) -> Error {
-    match error {
-        source @ Single::Call { .. } => {
-            Error::Case { case: format!("case {case}"), more: 0, source: Box::new(source) }
-        }
-        error => error.into(),
-    }
+    Error::of_case(format!("case {case}"), error)
 }

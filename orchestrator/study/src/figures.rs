@@ -5,7 +5,7 @@ use crate::results::{Results, RunResult};
 use crate::runs::Run;
 use crate::values::Quantity;
 use cosim::signal::Signal;
-use cosim_report::figure::{self, Color, Curve, Legend, Shape};
+use cosim_report::figure::{self, Color, Curve, Shape};
 use linear::curves::{ResponseCurves, excluded};
 use toml::Spanned;
 
@@ -21,12 +21,8 @@ type Shown<'a> = (&'a Run, &'a RunResult);
 /// Returns an error if the figure names an item that does not exist.
 pub(crate) fn figure(figure: &Figure, results: &Results) -> Result<figure::Figure, String> {
     let panels = figure.panels.iter().map(|drawn| panel(figure, drawn, results));
-    Ok(figure::Figure {
-        title: figure.title.clone(),
-        columns: figure.columns,
-        legend: Legend::Above,
-        panels: panels.collect::<Result<_, _>>()?,
-    })
+    let panels = panels.collect::<Result<_, _>>()?;
+    Ok(figure::Figure::new(figure.title.clone(), figure.columns, panels))
 }
 
 fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Panel, String> {
@@ -49,13 +45,10 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
     curves.extend(straight_lines(panel, results)?);
     Ok(figure::Panel {
         title: panel.title.clone(),
-        x_label: panel.x_label.as_deref().unwrap_or(x_label).to_string(),
-        y_label: panel.label.clone(),
         log_x: matches!(drawn, Drawn::Histogram(_) | Drawn::Response(Response::Sensitivity)),
         x_range: panel.x_range,
         y_range: panel.y_range,
-        curves,
-        ..figure::Panel::default()
+        ..figure::Panel::new(panel.x_label.as_deref().unwrap_or(x_label), &panel.label, curves)
     })
 }
 

@@ -119,10 +119,8 @@ impl Run {
     pub(crate) fn failed(&self, source: Single) -> Error {
         let run = self.id.get_ref();
         match source {
-            Single::Interrupted { .. } => Error::Single(source),
-            source @ Single::Call { .. } => {
-                let case = format!("a case of the run {run}");
-                Error::Case { case, more: 0, source: Box::new(source) }
+            Single::Interrupted { .. } | Single::Call { .. } => {
+                Error::of_case(format!("a case of the run {run}"), source)
             }
             source => Error::Run { run: run.as_str().into(), source },
         }

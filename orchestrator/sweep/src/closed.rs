@@ -18,17 +18,17 @@ pub fn closing(systems: &[System]) -> Option<Closing> {
     })
 }
 
-/// Works on parts as [`threads::on_parts`] does, with threads in a closed process. Results are
-/// `kept` in this one. If an instance ends or stops the process, the part fails, and another
-/// process works on what is left.
+/// Works on parts as [`threads::on_parts`] does, with threads in a closed process if one is asked
+/// for. Results are `kept` in this one. If an instance ends or stops the closed process, the part
+/// fails, and another process works on what is left.
 #[expect(clippy::too_many_arguments, reason = "each is part of what a part goes through")]
-pub fn on_parts<P: Sync, S, R, K, E>(
+pub fn on_parts<P: Sync, S, R, K: Send, E>(
     parts: &[P],
     mut count: usize,
-    (closing, interrupt): (&Closing, &Interrupt),
+    (closing, interrupt): (Option<&Closing>, &Interrupt),
     begin: impl Fn() -> Result<S, E> + Sync,
     work: impl Fn(&mut S, &P) -> Result<R, E> + Sync,
-    mut keep: impl FnMut(&P, R) -> Result<K, E>,
+    keep: impl Fn(&P, R) -> Result<K, E> + Sync,
     failed: impl Fn(&P, Ended) -> E,
     goes_on: impl Fn(&E) -> bool + Sync,
 ) -> Worked<K, E>
@@ -36,6 +36,10 @@ where
     R: Serialize + DeserializeOwned,
     E: Serialize + DeserializeOwned + Send,
 {
+    let Some(closing) = closing else {
+        let work = |state: &mut S, part: &P| keep(part, work(state, part)?);
+        return threads::on_parts(parts, count, begin, work, goes_on);
+    };
     let mut worked = Worked { results: BTreeMap::new(), failures: BTreeMap::new() };
     let mut left: Vec<usize> = (0..parts.len()).collect();
     while !left.is_empty() && interrupt.asked().is_none() {

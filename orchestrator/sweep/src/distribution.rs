@@ -8,7 +8,7 @@ use crate::vary::Vary;
 use cosim::system::System;
 use cosim::variation::{SettingValue, Target};
 use reader::Reader;
-use shape::{Continuous, Shape, count};
+use shape::{Continuous, Shape};
 
 /// Distribution of the values of a parameter.
 #[derive(Clone, Debug)]
@@ -47,9 +47,8 @@ impl Distribution {
     pub fn levels(&self) -> Result<u64, String> {
         match &self.0 {
             Shape::List { values, .. } => Ok(values.len() as u64),
-            Shape::Whole(ends) => Ok(count(*ends)),
             Shape::Continuous(_) | Shape::Case(_) => {
-                Err("the design levels needs single values: list or integers".into())
+                Err("the design levels needs single values: a list".into())
             }
         }
     }
@@ -71,7 +70,6 @@ impl Distribution {
     pub fn in_words(&self) -> String {
         match &self.0 {
             Shape::Continuous(continuous) => continuous.in_words(),
-            Shape::Whole([low, high]) => format!("integers, {low} to {high}"),
             Shape::List { values, .. } => {
                 let shown = values.iter().take(6).map(|value| match value {
                     SettingValue::Real(value) => shown(*value),
@@ -104,10 +102,6 @@ impl Distribution {
     pub fn value(&self, unit: f64, case: u64) -> SettingValue {
         match &self.0 {
             Shape::Continuous(continuous) => SettingValue::Real(continuous.value(unit)),
-            Shape::Whole(ends) => {
-                let offset = ((unit * count(*ends) as f64) as u64).min(count(*ends) - 1);
-                SettingValue::Integer((i64::from(ends[0]) + offset.cast_signed()) as i32)
-            }
             Shape::List { values, sums } => {
                 let index = sums.partition_point(|sum| *sum <= unit);
                 values[index.min(values.len().saturating_sub(1))].clone()

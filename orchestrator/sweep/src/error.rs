@@ -53,6 +53,14 @@ pub enum Error {
 }
 
 impl Error {
+    /// Names the case, in words, in which an FMU could not be flown.
+    pub fn of_case(case: String, source: Single) -> Self {
+        match source {
+            Single::Call { .. } => Self::Case { case, more: 0, source: Box::new(source) },
+            source => source.into(),
+        }
+    }
+
     /// Returns the exit code of a process that ends with this error.
     pub fn exit_code(&self) -> u8 {
         match self {

@@ -16,9 +16,6 @@ use linear::linearise::{Linearised, Lineariser};
 use linear::measures::{self, Measured};
 use std::collections::BTreeMap;
 
-/// Number of other cases that are tried before an FMU's failure counts as that of its installation.
-const OTHERS: u64 = 8;
-
 /// Result of a case.
 #[derive(Debug)]
 pub struct Flown {
@@ -179,12 +176,6 @@ impl<'a> Flight<'a> {
         let Watch { time, .. } = watch;
         let outcome = match outcome {
             Err(error) if !is_of_case(&error) => return Err(error),
-            // An instance may fail before the flight for a reason other than its values, such as a
-            // missing file: then it fails without them, too.
-            Err(error @ Error::Call { .. }) if time.is_none() => {
-                self.start_without_numbers(&changes)?;
-                Err(error)
-            }
             outcome => outcome,
         };
         let mut metrics = Metrics {
@@ -196,24 +187,6 @@ impl<'a> Flight<'a> {
         metrics.asked.extend(margins);
         let time = time.unwrap_or(self.sweep.span[0]);
         Ok(Flown { case, values, metrics, outcome, without_margins, time })
-    }
-
-    /// Starts new instances with the texts among these changes, and without their numbers. What the
-    /// file sets may need numbers that vary, so that those of other cases are tried as well.
-    fn start_without_numbers(&self, changes: &[(Target, SettingValue)]) -> Result<(), Error> {
-        let is_text = |change: &&(Target, SettingValue)| matches!(change.1, SettingValue::Text(_));
-        let texts = || changes.iter().filter(is_text).cloned();
-        let start = |changes: &[_]| self.system.start_varied(changes, self.interrupt).map(drop);
-        let alone = start(&texts().collect::<Vec<_>>());
-        if alone.is_ok() {
-            return alone;
-        }
-        let mut others = (0..OTHERS).map(|case| {
-            let numbers = self.sweep.changes(&self.sweep.values(case)).into_iter();
-            let numbers = numbers.filter(|change| !is_text(&change));
-            start(&numbers.chain(texts()).collect::<Vec<_>>())
-        });
-        if others.any(|outcome| outcome.is_ok()) { Ok(()) } else { alone }
     }
 }
 

@@ -5,7 +5,7 @@ use crate::cases::Sweep;
 use crate::closed;
 use crate::error::Error;
 use crate::parts::{PartResult, Store};
-use crate::threads::{Worked, on_parts};
+use crate::threads::Worked;
 use cosim::error::Error as Single;
 use cosim::interrupt::Interrupt;
 use cosim::system::System;
@@ -112,36 +112,33 @@ impl<'a> Work<'a> {
         }
         let (done, left) = (self.cases, parts.iter().map(Part::count).sum::<u64>());
         let progress = Parts::new("cases", self.title, done + left, done, options.quiet);
-        let stores = &self.stores;
-        let keep =
-            |part: &Part, result: PartResult| Ok(stores[part.sweep].write(&part.cases, &result)?);
-        let goes_on = |error: &Error| matches!(error, Error::Case { .. });
-        let Worked { results, failures } = if let Some(closing) = closed::closing(systems) {
+        let (stores, closing) = (&self.stores, closed::closing(systems));
+        // A closed process does not draw.
+        let hidden = || closing.is_some().then(|| Parts::new("cases", "", 0, 0, true));
+        if closing.is_some() {
             progress.draw_here();
-            let begin = || Ok((begin()?, Parts::new("cases", "", 0, 0, true)));
-            closed::on_parts(
-                parts,
-                threads,
-                (&closing, &options.interrupt),
-                begin,
-                |(state, hidden), part| fly(state, part, hidden),
-                |part, result| {
+        }
+        let Worked { results, failures } = closed::on_parts(
+            parts,
+            threads,
+            (closing.as_ref(), &options.interrupt),
+            || Ok((begin()?, hidden())),
+            |(state, hidden), part| fly(state, part, hidden.as_ref().unwrap_or(&progress)),
+            |part, result| {
+                if closing.is_some() {
                     progress.advance(part.count());
-                    keep(part, result)
-                },
-                |part, ended| {
-                    let case = if let Ended::Failed(last) = &ended { last.case } else { None };
-                    match systems[part.sweep].ended(ended, &options.interrupt) {
-                        error @ Single::Interrupted { .. } => Error::Single(error),
-                        error => failed(part, case, error),
-                    }
-                },
-                goes_on,
-            )
-        } else {
-            let work = |state: &mut S, part: &Part| keep(part, fly(state, part, &progress)?);
-            on_parts(parts, threads, begin, work, goes_on)
-        };
+                }
+                Ok(stores[part.sweep].write(&part.cases, &result)?)
+            },
+            |part, ended| {
+                let case = if let Ended::Failed(last) = &ended { last.case } else { None };
+                match systems[part.sweep].ended(ended, &options.interrupt) {
+                    error @ Single::Interrupted { .. } => Error::Single(error),
+                    error => failed(part, case, error),
+                }
+            },
+            |error| matches!(error, Error::Case { .. }),
+        );
         progress.finish();
         self.cases += results.into_keys().map(|at| parts[at].count()).sum::<u64>();
         let (cases, mut others): (Vec<Error>, Vec<Error>) =

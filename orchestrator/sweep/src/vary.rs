@@ -21,8 +21,7 @@ pub struct Vary {
     /// Whether the values of `each` are sorted in ascending order, as switching times must be.
     #[serde(default)]
     pub sorted: bool,
-    /// Smallest and largest value of a uniform distribution. An integer parameter gets integers,
-    /// both ends included.
+    /// Smallest and largest value of a uniform distribution.
     #[schemars(with = "Option<[cosim::experiment::Scalar; 2]>")]
     pub uniform: Option<[Value; 2]>,
     /// Mean and standard deviation of a normal distribution.

@@ -232,7 +232,7 @@ fn a_wrong_file_is_refused_with_the_key_the_line_and_the_nearest_name() {
         (
             "list = [0.5, 1.0, 2.0]",
             "normal = { mean = 1.0, deviation = 0.1 }",
-            "the design levels needs single values: list or integers",
+            "the design levels needs single values: a list",
         ),
         ("list = [0.5, 1.0, 2.0]", "uniform = [2.0, 1.0]", "must be larger than the first one"),
         ("list = [0.5, 1.0, 2.0]", "list = [1.0]\ncase = 2", "one distribution is needed"),

@@ -3,7 +3,7 @@
 use crate::findings::breaking;
 use crate::plan::Plan;
 use crate::prepare::Recorded;
-use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, with_unit};
+use cosim_report::figure::{Color, Curve, Figure, Panel, Shape, with_unit};
 use std::collections::BTreeSet;
 use sweep::table::CaseTable;
 use sweep::varied::Varied;
@@ -26,10 +26,6 @@ fn label(measure: &Recorded) -> String {
     with_unit(&measure.words, &measure.unit)
 }
 
-fn panel(x_label: &str, y_label: &str, curves: Vec<Curve>) -> Panel {
-    Panel { x_label: x_label.into(), y_label: y_label.into(), curves, ..Panel::default() }
-}
-
 /// Draws the histogram of each measure that differs from case to case.
 pub(super) fn distributions(plan: &Plan, table: &CaseTable) -> Option<Figure> {
     let mut panels = Vec::new();
@@ -46,14 +42,14 @@ pub(super) fn distributions(plan: &Plan, table: &CaseTable) -> Option<Figure> {
         let (edges, counts) = histogram(&values, low, high);
         let mut curves = vec![Curve::new("cases", FIRST, Shape::Steps, edges, counts)];
         let limits = plan.limits().filter(|(limit, _)| limit.measure.get_ref() == &measure.name);
-        curves.extend(limits.filter_map(|(limit, _)| limit.at_most.or(limit.at_least)).map(|at| {
-            Curve::new("limit", Color::LIMIT, Shape::Vertical, vec![at], vec![f64::NAN])
+        curves.extend(limits.map(|(limit, _)| {
+            let at = vec![limit.bound().0];
+            Curve::new("limit", Color::LIMIT, Shape::Vertical, at, vec![f64::NAN])
         }));
-        panels.push(panel(&label(measure), "number of cases", curves));
+        panels.push(Panel::new(&label(measure), "number of cases", curves));
     }
     let title = format!("Distributions over {}", super::cases(table.rows() as u64));
-    let columns = COLUMNS.min(panels.len());
-    (columns > 0).then_some(Figure { title, columns, legend: Legend::Above, panels })
+    (!panels.is_empty()).then(|| Figure::new(title, COLUMNS, panels))
 }
 
 /// Returns the edges of a histogram's bins and the number of values in each; the last edge has no
@@ -105,13 +101,12 @@ pub(super) fn scatters(plan: &Plan, table: &CaseTable) -> Vec<Figure> {
                 curves.push(Curve::new("broke a limit", SECOND, Shape::Dots, bad_x, bad_y));
             }
             let title = with_unit(&varied.name, &varied.unit);
-            Panel { title, ..panel("", &label(measure), curves) }
+            Panel { title, ..Panel::new("", &label(measure), curves) }
         });
         let panels: Vec<Panel> = panels.collect();
         if !panels.is_empty() {
             let title = format!("{} against the varied parameters", measure.words);
-            let columns = COLUMNS.min(panels.len());
-            figures.push(Figure { title, columns, legend: Legend::Above, panels });
+            figures.push(Figure::new(title, COLUMNS, panels));
         }
     }
     figures

@@ -9,7 +9,7 @@ use cosim::experiment::name_of;
 use cosim::files;
 use cosim::interrupt::Interrupt;
 use cosim::variation::SettingValue;
-use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg, with_unit};
+use cosim_report::figure::{Color, Curve, Figure, Panel, Shape, svg, with_unit};
 use cosim_report::page::{Page, Section, figure, table, verdict};
 use maud::{Markup, html};
 use std::path::Path;
@@ -59,7 +59,7 @@ pub(super) fn write(
 /// Returns the bound of the first limit on a measure, and whether values must lie below it.
 fn bound(plan: &Plan, measure: &str) -> Option<(f64, bool)> {
     let limit = plan.campaign.limits.iter().find(|limit| limit.measure.get_ref() == measure)?;
-    limit.at_most.map(|most| (most, true)).or(limit.at_least.map(|least| (least, false)))
+    Some(limit.bound())
 }
 
 /// Draws the values that were tried, and the largest one so far.
@@ -79,18 +79,9 @@ fn history(plan: &Plan, outcome: &SearchOutcome, tried: &[Tried]) -> Figure {
     curves.extend(bound(plan, &outcome.measure).map(|(limit, _)| {
         Curve::new("limit", Color::LIMIT, Shape::Horizontal, vec![f64::NAN], vec![limit])
     }));
-    let panel = Panel {
-        x_label: "number of cases".into(),
-        y_label: with_unit(plan.words(&outcome.measure), &outcome.unit),
-        curves,
-        ..Panel::default()
-    };
-    Figure {
-        title: format!("{}: search for the worst case", outcome.title),
-        columns: 1,
-        legend: Legend::Above,
-        panels: vec![panel],
-    }
+    let label = with_unit(plan.words(&outcome.measure), &outcome.unit);
+    let panel = Panel::new("number of cases", &label, curves);
+    Figure::new(format!("{}: search for the worst case", outcome.title), 1, vec![panel])
 }
 
 fn caption(outcome: &SearchOutcome) -> Markup {

@@ -76,6 +76,13 @@ pub struct Figure {
     pub panels: Vec<Panel>,
 }
 
+impl Figure {
+    /// Creates a figure with at most this number of panels in a row, whose legend is above them.
+    pub fn new(title: String, columns: usize, panels: Vec<Panel>) -> Self {
+        Self { title, columns: columns.min(panels.len()), legend: Legend::Above, panels }
+    }
+}
+
 /// One pair of axes with its curves.
 #[derive(Clone, Debug, Default)]
 pub struct Panel {
@@ -122,9 +129,10 @@ impl Curve {
     }
 }
 
-/// Returns a name with its unit, if it has one, as labels and headings write them.
+/// Returns a name with its unit, as labels and headings write them. Either may be empty.
 pub fn with_unit(name: &str, unit: &str) -> String {
-    if unit.is_empty() { name.to_string() } else { format!("{name}, {unit}") }
+    let parts = [name, unit].into_iter().filter(|part| !part.is_empty());
+    parts.collect::<Vec<_>>().join(", ")
 }
 
 /// Shape in which the points of a curve are drawn.
@@ -179,6 +187,11 @@ impl Shape {
 }
 
 impl Panel {
+    /// Creates a panel with these labels of the axes.
+    pub fn new(x_label: &str, y_label: &str, curves: Vec<Curve>) -> Self {
+        Self { x_label: x_label.into(), y_label: y_label.into(), curves, ..Self::default() }
+    }
+
     /// Returns the smallest and the largest value along one axis, including lines across the panel;
     /// `None` if no value is finite.
     fn extent(&self, along_x: bool) -> Option<(f64, f64)> {

@@ -68,11 +68,8 @@ pub fn panels(runs: &[Recording], names: &[String]) -> Vec<Panel> {
     track.insert(0, Curve::new("", Color::GREY, Shape::Pale, x, y));
     let panel = |title: &str, x_label: &str, y_label: &str, curves| Panel {
         title: title.into(),
-        x_label: x_label.into(),
-        y_label: y_label.into(),
         height: Some(HEIGHT),
-        curves,
-        ..Panel::default()
+        ..Panel::new(x_label, y_label, curves)
     };
     vec![
         panel("Altitude over speed", "speed, km/s", "altitude, km", energy),

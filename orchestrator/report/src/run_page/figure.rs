@@ -1,7 +1,7 @@
 //! The panels of several recordings as a figure for SVG and PNG.
 
 use super::thin;
-use crate::figure::{self, Color, Figure, Legend, Shape};
+use crate::figure::{self, Color, Figure, Legend, Shape, with_unit};
 use crate::recording::Recording;
 use crate::recording::panels::{Curve, Panel, Role, symbols};
 use crate::recording::trajectory;
@@ -59,16 +59,11 @@ fn drawn(runs: &[Recording], names: &[String], panel: &Panel) -> figure::Panel {
         let drawn = curves.iter_mut().filter(|curve| !curve.shape.is_straight());
         drawn.flat_map(|curve| &mut curve.y).for_each(|y| *y = y.abs().max(low));
     }
-    let parts = [symbols(&panel.label), panel.unit.clone()];
-    let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
     figure::Panel {
-        x_label: "time, s".into(),
-        y_label: parts.join(", "),
         log_y: panel.magnitudes.is_some(),
         x_range: span(runs),
         y_range: panel.magnitudes,
-        curves,
-        ..figure::Panel::default()
+        ..figure::Panel::new("time, s", &with_unit(&symbols(&panel.label), &panel.unit), curves)
     }
 }
 

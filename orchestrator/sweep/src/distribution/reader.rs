@@ -6,7 +6,6 @@ use cosim::system::System;
 use cosim::variation::{SettingValue, Target};
 use fmi_master::description::VariableKind;
 use statrs::distribution as statrs;
-use std::fmt::Display;
 use toml::Value;
 
 /// Reads the values of a distribution for one target.
@@ -31,34 +30,34 @@ impl Reader<'_> {
         &self.system.variable(self.target).kind
     }
 
-    fn uniform(&self, [low, high]: &[Value; 2]) -> Result<Shape, String> {
+    /// Refuses a distribution of real numbers for a parameter of another type.
+    fn check_real(&self, distribution: &str) -> Result<(), String> {
         match self.kind() {
-            VariableKind::Integer { .. } => {
-                let whole = |value: &Value| match self.setting(value)? {
-                    SettingValue::Integer(value) => Ok(value),
-                    other => Err(format!("uniform: {} is no integer", other.to_json())),
-                };
-                let (low, high) = (whole(low)?, whole(high)?);
-                if low < high { Ok(Shape::Whole([low, high])) } else { Err(reversed(low, high)) }
+            VariableKind::Real { .. } => Ok(()),
+            kind => {
+                let kind = kind.name();
+                Err(format!(
+                    "{distribution} is for parameters of type Real, not {kind}: use a list"
+                ))
             }
-            VariableKind::Real { .. } => {
-                let (low, high) = (self.number(low)?, self.number(high)?);
-                match statrs::Uniform::new(low, high) {
-                    Ok(uniform) if low < high && (high - low).is_finite() => {
-                        Ok(Whole::Uniform(uniform).into())
-                    }
-                    _ => Err(reversed(low, high)),
-                }
+        }
+    }
+
+    fn uniform(&self, [low, high]: &[Value; 2]) -> Result<Shape, String> {
+        self.check_real("uniform")?;
+        let (low, high) = (self.number(low)?, self.number(high)?);
+        match statrs::Uniform::new(low, high) {
+            Ok(uniform) if low < high && (high - low).is_finite() => {
+                Ok(Whole::Uniform(uniform).into())
             }
-            kind => Err(format!("uniform is for numbers, not for {}: use a list", kind.name())),
+            _ => Err(format!(
+                "uniform = [{low}, {high}]: the second value must be larger than the first one"
+            )),
         }
     }
 
     fn normal(&self, normal: &Normal) -> Result<Shape, String> {
-        let kind = self.kind();
-        if !matches!(kind, VariableKind::Real { .. }) {
-            return Err(format!("normal is for parameters of type Real, not {}", kind.name()));
-        }
+        self.check_real("normal")?;
         let mean = self.number(&normal.mean)?;
         let deviation = self.difference(&normal.deviation)?;
         statrs::Normal::new(mean, deviation)
@@ -173,10 +172,6 @@ impl Reader<'_> {
         };
         self.system.value(self.target, &written)
     }
-}
-
-fn reversed(low: impl Display, high: impl Display) -> String {
-    format!("uniform = [{low}, {high}]: the second value must be larger than the first one")
 }
 
 fn finite(number: f64) -> Result<f64, String> {

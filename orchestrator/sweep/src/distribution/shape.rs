@@ -12,8 +12,6 @@ const SMALLEST: f64 = 1e-9;
 #[derive(Clone, Debug)]
 pub(super) enum Shape {
     Continuous(Continuous),
-    /// Integers, both ends included.
-    Whole([i32; 2]),
     /// Values with the probabilities up to and including each of them.
     List {
         values: Vec<SettingValue>,
@@ -21,11 +19,6 @@ pub(super) enum Shape {
     },
     /// Consecutive integers, one for each case.
     Case(Seeds),
-}
-
-/// Returns the number of integers between two, both included.
-pub(super) fn count([low, high]: [i32; 2]) -> u64 {
-    u64::from(high.abs_diff(low)) + 1
 }
 
 /// Seeds that differ from case to case, and from one sweep to another.
