@@ -303,7 +303,6 @@ def test_a_changed_measure_is_computed_again(tmp_path, key, other):
         ("crmpc-2022", 'signal = "estimator.attitude.alpha ', 'signal = "estimator.attitude.alphaa ', 'did you mean "estimator.attitude.alpha"'),
         ("crmpc-2022", 'paper = "ems.dlmpc"', 'paper = "ems.dlmp"', 'did you mean "ems.dlmpc"'),
         ("crmpc-2022", 'ours = "dlmpc-est.cms"', 'ours = "dlmpc-est.cmss"', 'did you mean "cms"'),
-        ("crmpc-2022", 'beside = "dlmpc.cms"', 'beside = "dlmpc.cmss"', 'did you mean "cms"'),
         ("crmpc-2022", 'left = "crmpc-paper.cms"', 'left = "crmpc-papr.cms"', 'did you mean "crmpc-paper"'),
         ("crmpc-2022", 'seeds = ["plant.disturbance.seed"]', 'seeds = ["plant.disturbance.sed"]', "disturbance.seed"),
         ("crmpc-2022", 'bound = "tube.case1"', 'bound = "tube.cas1"', "tube.cas1"),

@@ -9,10 +9,6 @@ fn paper() -> String {
     "Paper".into()
 }
 
-fn ours() -> String {
-    "Ours".into()
-}
-
 /// A table that compares numbers of the paper with ours.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -25,12 +21,6 @@ pub struct ComparisonTable {
     /// Heading of the column of numbers to compare with.
     #[serde(default = "paper")]
     pub against: String,
-    /// Heading of the column of our numbers.
-    #[serde(default = "ours")]
-    pub ours: String,
-    /// Heading of a further column of our numbers. Without it there is no such column.
-    #[serde(default)]
-    pub beside: String,
     /// Rows of the table, each with one quantity.
     #[serde(rename = "row")]
     pub rows: Vec<ComparisonRow>,
@@ -46,8 +36,6 @@ pub struct ComparisonRow {
     pub paper: Option<Quantity>,
     /// Our number, as `run.metric`.
     pub ours: String,
-    /// Our number in the further column, as `run.metric`.
-    pub beside: Option<String>,
     /// Note that is shown beside the numbers.
     #[serde(default)]
     pub note: String,

@@ -3,12 +3,11 @@
 mod reader;
 mod shape;
 
-use crate::texts::shown;
 use crate::vary::Vary;
 use cosim::system::System;
 use cosim::variation::{SettingValue, Target};
 use reader::Reader;
-use shape::{Continuous, Shape};
+use shape::Shape;
 
 /// Distribution of the values of a parameter.
 #[derive(Clone, Debug)]
@@ -22,19 +21,9 @@ impl Distribution {
     /// target.
     pub fn new(vary: &Vary, target: Target, system: &System, seed: u64) -> Result<Self, String> {
         let reader = Reader { system, target, seed };
-        let mut shape = reader.shape(&vary.asked()?)?;
-        let Shape::Continuous(continuous) = &mut shape else {
-            return match vary.within {
-                Some(_) => Err("within is for continuous distributions only".into()),
-                None => Ok(Self(shape)),
-            };
-        };
-        if let Some(within) = &vary.within {
-            let [low, high] = within;
-            continuous.truncate(reader.number(low)?, reader.number(high)?)?;
-        }
+        let shape = reader.shape(&vary.asked()?)?;
         // All values that can be drawn must be within the limits of the variable.
-        for end in continuous.ends.into_iter().flatten() {
+        for end in shape.ends().into_iter().flatten() {
             reader.checked(end)?;
         }
         Ok(Self(shape))
@@ -47,9 +36,7 @@ impl Distribution {
     pub fn levels(&self) -> Result<u64, String> {
         match &self.0 {
             Shape::List { values, .. } => Ok(values.len() as u64),
-            Shape::Continuous(_) | Shape::Case(_) => {
-                Err("the design levels needs single values: a list".into())
-            }
+            _ => Err("the design levels needs single values: a list".into()),
         }
     }
 
@@ -58,8 +45,8 @@ impl Distribution {
     /// # Errors
     /// Returns an error if it has none, so that there are no corners.
     pub fn check_ends(&self) -> Result<(), String> {
-        match self.0 {
-            Shape::Continuous(Continuous { ends: None, .. }) => {
+        match &self.0 {
+            Shape::Normal(normal) if normal.ends.is_none() => {
                 Err("the distribution is unbounded: corners and searches need within here".into())
             }
             _ => Ok(()),
@@ -68,18 +55,7 @@ impl Distribution {
 
     /// Returns the distribution in words.
     pub fn in_words(&self) -> String {
-        match &self.0 {
-            Shape::Continuous(continuous) => continuous.in_words(),
-            Shape::List { values, .. } => {
-                let shown = values.iter().take(6).map(|value| match value {
-                    SettingValue::Real(value) => shown(*value),
-                    other => other.to_json().to_string(),
-                });
-                let more = if values.len() > 6 { ", …" } else { "" };
-                format!("one of {}{more}", shown.collect::<Vec<_>>().join(", "))
-            }
-            Shape::Case(seeds) => format!("number of the case + {}", seeds.first),
-        }
+        self.0.in_words()
     }
 
     /// Returns the texts among the values.
@@ -100,14 +76,6 @@ impl Distribution {
     /// Returns the quantile of this probability for the case with this number. Those of 0 and 1 are
     /// the ends.
     pub fn value(&self, unit: f64, case: u64) -> SettingValue {
-        match &self.0 {
-            Shape::Continuous(continuous) => SettingValue::Real(continuous.value(unit)),
-            Shape::List { values, sums } => {
-                let index = sums.partition_point(|sum| *sum <= unit);
-                values[index.min(values.len().saturating_sub(1))].clone()
-            }
-            // The ends of the seeds are those of an integer.
-            Shape::Case(seeds) => SettingValue::Integer(seeds.of(case) as i32),
-        }
+        self.0.value(unit, case)
     }
 }

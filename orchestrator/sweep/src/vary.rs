@@ -33,9 +33,6 @@ pub struct Vary {
     /// First of consecutive integers: the parameter is this number plus that of the case, as for
     /// seeds. With another `seed` of the file than 1 they begin elsewhere.
     pub case: Option<i64>,
-    /// Lower and upper bound at which a continuous distribution is truncated.
-    #[schemars(with = "Option<[cosim::experiment::Scalar; 2]>")]
-    pub within: Option<[Value; 2]>,
     /// Probabilities of the values of `list`, which are scaled to a sum of 1.
     pub weights: Option<Vec<f64>>,
 }
@@ -123,6 +120,9 @@ pub struct Normal {
     /// Standard deviation of the distribution.
     #[schemars(with = "cosim::experiment::Scalar")]
     pub deviation: Value,
+    /// Lower and upper bound at which the distribution is truncated.
+    #[schemars(with = "Option<[cosim::experiment::Scalar; 2]>")]
+    pub within: Option<[Value; 2]>,
 }
 
 /// Design that places the cases in the space of the varied parameters.

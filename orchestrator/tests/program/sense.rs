@@ -37,12 +37,18 @@ fn distributions_that_make_no_sense_are_refused_with_the_parameter() {
         ("list = [1.0, 2.0]\nweights = [0.0, 0.0]", "not all zero"),
         ("list = [1.0, 2.0]\nweights = [1.0, inf]", "weights must not be"),
         ("list = [1.0, 2.0]\nweights = [1.0]", "1 weights for 2 values"),
-        ("uniform = [0.0, 1.0]\nwithin = [2.0, 3.0]", "next to no values between them"),
-        ("uniform = [0.0, 1.0]\nwithin = [0.7, 0.2]", "must be larger than the first one"),
-        ("normal = { mean = 0.0, deviation = 1.0 }\nwithin = [9.0, 10.0]", "next to no values"),
-        ("normal = { mean = 0.0, deviation = 1.0 }\nwithin = [8.0, 8.1]", "next to no values"),
-        ("normal = { mean = 0.0, deviation = 1.0 }\nwithin = [-inf, 1.0]", "no finite number"),
-        ("list = [1.0, 2.0]\nwithin = [0.0, 3.0]", "within is for continuous distributions"),
+        (
+            "normal = { mean = 0.0, deviation = 0.1, within = [2.0, 3.0] }",
+            "next to no values between them",
+        ),
+        (
+            "normal = { mean = 0.0, deviation = 1.0, within = [0.7, 0.2] }",
+            "must be larger than the first one",
+        ),
+        ("normal = { mean = 0.0, deviation = 1.0, within = [9.0, 10.0] }", "next to no values"),
+        ("normal = { mean = 0.0, deviation = 1.0, within = [8.0, 8.1] }", "next to no values"),
+        ("normal = { mean = 0.0, deviation = 1.0, within = [-inf, 1.0] }", "no finite number"),
+        ("list = [1.0, 2.0]\nwithin = [0.0, 3.0]", "unknown field `within`"),
         ("uniform = [0.0, 1.0]\nweights = [1.0]", "weights are for a list only"),
         ("uniform = [0.0, 1.0]\nlist = [1.0]", "but there is uniform and list"),
         ("uniform = [0.0, 1.0]\nsorted = true", "sorted is for several real parameters"),
@@ -53,7 +59,7 @@ fn distributions_that_make_no_sense_are_refused_with_the_parameter() {
         assert!(errors.contains("gain.gain") || errors.contains("sorted"), "{errors}");
     }
     // Values of a small part at the lower end can be distinguished.
-    let tail = "normal = { mean = 0.0, deviation = 1.0 }\nwithin = [-8.1, -8.0]";
+    let tail = "normal = { mean = 0.0, deviation = 1.0, within = [-8.1, -8.0] }";
     bench(&RANDOM.replace(UNIFORM, tail)).says(&["campaign", "c.toml", "--work"]);
 }
 

@@ -26,11 +26,8 @@ pub(super) fn small(full: &Overview, results: &Results) -> Markup {
 }
 
 pub(crate) fn comparison(compared: &ComparisonTable, results: &Results) -> Result<Markup, String> {
-    let has_beside = !compared.beside.is_empty();
-    let mut headings = vec!["Quantity", &compared.against, &compared.ours, "Difference"];
-    headings.extend(has_beside.then_some(compared.beside.as_str()));
-    headings.push("Remark");
-    let rows = compared.rows.iter().map(|compared| row(compared, has_beside, results));
+    let headings = ["Quantity", &compared.against, "Ours", "Difference", "Remark"];
+    let rows = compared.rows.iter().map(|compared| row(compared, results));
     let rows = rows.collect::<Result<Vec<_>, _>>()?;
     Ok(html! {
         (table(&headings, rows))
@@ -38,9 +35,8 @@ pub(crate) fn comparison(compared: &ComparisonTable, results: &Results) -> Resul
     })
 }
 
-fn row(row: &ComparisonRow, has_beside: bool, results: &Results) -> Result<Vec<Markup>, String> {
+fn row(row: &ComparisonRow, results: &Results) -> Result<Vec<Markup>, String> {
     let ours = results.numbers(&row.ours)?;
-    let beside = row.beside.as_ref().map(|beside| results.numbers(beside)).transpose()?;
     let paper = row.paper.as_ref().map(|paper| results.study.values.number(paper)).transpose()?;
     let origin = match &row.paper {
         Some(Quantity::Named(id)) => results.study.values.find(id).map(|value| &value.source),
@@ -54,15 +50,13 @@ fn row(row: &ComparisonRow, has_beside: bool, results: &Results) -> Result<Vec<M
         }
         format!("{} ({})", signed(absolute), difference(&Numbers(vec![ours.mean() / paper - 1.0])))
     });
-    let mut cells = vec![
+    Ok(vec![
         html! { span title=[origin] { (row.label) } },
         html! { (paper.map_or("–".into(), shown)) },
         html! { (several(&ours)) },
         html! { (difference.as_deref().unwrap_or("–")) },
-    ];
-    cells.extend(has_beside.then(|| html! { (beside.as_ref().map_or("–".into(), several)) }));
-    cells.push(html! { span.remark { (row.note) } });
-    Ok(cells)
+        html! { span.remark { (row.note) } },
+    ])
 }
 
 /// Returns all rows and columns of an overview.

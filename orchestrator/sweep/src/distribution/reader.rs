@@ -1,6 +1,6 @@
 //! Reads the distribution of a parameter, with units converted.
 
-use super::shape::{Seeds, Shape, Whole};
+use super::shape::{Seeds, Shape, Truncated, reversed};
 use crate::vary::{Asked, Normal};
 use cosim::system::System;
 use cosim::variation::{SettingValue, Target};
@@ -47,12 +47,8 @@ impl Reader<'_> {
         self.check_real("uniform")?;
         let (low, high) = (self.number(low)?, self.number(high)?);
         match statrs::Uniform::new(low, high) {
-            Ok(uniform) if low < high && (high - low).is_finite() => {
-                Ok(Whole::Uniform(uniform).into())
-            }
-            _ => Err(format!(
-                "uniform = [{low}, {high}]: the second value must be larger than the first one"
-            )),
+            Ok(uniform) if low < high && (high - low).is_finite() => Ok(Shape::Uniform(uniform)),
+            _ => Err(reversed("uniform", low, high)),
         }
     }
 
@@ -60,9 +56,13 @@ impl Reader<'_> {
         self.check_real("normal")?;
         let mean = self.number(&normal.mean)?;
         let deviation = self.difference(&normal.deviation)?;
-        statrs::Normal::new(mean, deviation)
-            .map(|normal| Whole::Normal(normal).into())
-            .map_err(|_| format!("normal: deviation = {deviation}, but it must be above 0"))
+        let whole = statrs::Normal::new(mean, deviation)
+            .map_err(|_| format!("normal: deviation = {deviation}, but it must be above 0"))?;
+        let ends = match &normal.within {
+            Some([low, high]) => Some([self.number(low)?, self.number(high)?]),
+            None => None,
+        };
+        Ok(Shape::Normal(Truncated::new(whole, ends)?))
     }
 
     fn list(&self, values: &[Value], weights: Option<&[f64]>) -> Result<Shape, String> {

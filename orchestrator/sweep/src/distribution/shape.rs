@@ -11,7 +11,8 @@ const SMALLEST: f64 = 1e-9;
 /// Shape of a distribution.
 #[derive(Clone, Debug)]
 pub(super) enum Shape {
-    Continuous(Continuous),
+    Uniform(Uniform),
+    Normal(Truncated),
     /// Values with the probabilities up to and including each of them.
     List {
         values: Vec<SettingValue>,
@@ -55,104 +56,106 @@ impl Seeds {
     }
 }
 
-/// A continuous distribution, which may be truncated.
+/// A normal distribution, which may be truncated.
 #[derive(Clone, Debug)]
-pub(super) struct Continuous {
-    whole: Whole,
+pub(super) struct Truncated {
+    whole: Normal,
     /// Probabilities between which the quantiles lie.
     between: [f64; 2],
     /// Smallest and largest value, if there are any.
     pub(super) ends: Option<[f64; 2]>,
 }
 
-/// A continuous distribution before a truncation.
-#[derive(Clone, Debug)]
-pub(super) enum Whole {
-    Uniform(Uniform),
-    Normal(Normal),
-}
-
-impl Whole {
-    fn function(&self) -> &dyn ContinuousCDF<f64, f64> {
-        match self {
-            Self::Uniform(distribution) => distribution,
-            Self::Normal(distribution) => distribution,
-        }
-    }
-
-    fn ends(&self) -> Option<[f64; 2]> {
-        let ends = [self.function().min(), self.function().max()];
-        ends.iter().all(|end| end.is_finite()).then_some(ends)
-    }
-}
-
-impl From<Whole> for Shape {
-    fn from(whole: Whole) -> Self {
-        let ends = whole.ends();
-        Self::Continuous(Continuous { whole, between: [0.0, 1.0], ends })
-    }
-}
-
-impl Continuous {
-    /// Cuts off what lies outside two values.
+impl Truncated {
+    /// Cuts off what lies outside two values, if there are any.
     ///
     /// # Errors
     /// Returns an error if next to nothing is left.
-    pub(super) fn truncate(&mut self, low: f64, high: f64) -> Result<(), String> {
+    pub(super) fn new(whole: Normal, ends: Option<[f64; 2]>) -> Result<Self, String> {
+        let Some([low, high]) = ends else {
+            return Ok(Self { whole, between: [0.0, 1.0], ends });
+        };
         if low >= high {
-            return Err(format!(
-                "within = [{low}, {high}]: the second value must be larger than the first one"
-            ));
+            return Err(reversed("within", low, high));
         }
-        let [from, to] = [low, high].map(|value| self.whole.function().cdf(value));
+        let between = [low, high].map(|value| whole.cdf(value));
         // In a smaller part of the upper tail, few values could be distinguished.
-        if to - from <= SMALLEST * to {
+        if between[1] - between[0] <= SMALLEST * between[1] {
             return Err(format!(
                 "within = [{low}, {high}]: the distribution has next to no values between them"
             ));
         }
-        self.between = [from, to];
-        let [least, most] = self.bounds();
-        self.ends = Some([low.max(least), high.min(most)]);
-        Ok(())
+        Ok(Self { whole, between, ends })
     }
 
-    /// Returns the ends, which are infinite if there are none.
-    fn bounds(&self) -> [f64; 2] {
-        self.ends.unwrap_or([f64::NEG_INFINITY, f64::INFINITY])
-    }
-
-    pub(super) fn value(&self, unit: f64) -> f64 {
-        let [low, high] = match self.ends {
-            // Rounding must not miss an end.
-            Some([low, _]) if unit <= 0.0 => return low,
-            Some([_, high]) if unit >= 1.0 => return high,
-            _ => self.bounds(),
-        };
+    /// Returns the quantile of a probability between 0 and 1.
+    fn value(&self, unit: f64) -> f64 {
         let [from, to] = self.between;
-        let mut unit = from + unit * (to - from);
-        if self.whole.ends().is_none() {
-            // The ends of an unbounded distribution are infinite.
-            unit = unit.clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0);
+        // The ends of the whole distribution are infinite.
+        let unit = (from + unit * (to - from)).clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0);
+        self.whole.inverse_cdf(unit)
+    }
+}
+
+/// Says that the second one of two values must be larger.
+pub(super) fn reversed(key: &str, low: f64, high: f64) -> String {
+    format!("{key} = [{low}, {high}]: the second value must be larger than the first one")
+}
+
+impl Shape {
+    /// Returns the smallest and the largest value of a continuous distribution that has ends.
+    pub(super) fn ends(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Uniform(uniform) => Some([uniform.min(), uniform.max()]),
+            Self::Normal(normal) => normal.ends,
+            Self::List { .. } | Self::Case(_) => None,
         }
-        self.whole.function().inverse_cdf(unit).clamp(low, high)
+    }
+
+    /// Returns the quantile of this probability for the case with this number. Those of 0 and 1 are
+    /// the ends.
+    pub(super) fn value(&self, unit: f64, case: u64) -> SettingValue {
+        let [low, high] = self.ends().unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        let real = |quantile: &dyn Fn(f64) -> f64| {
+            // Rounding must not miss an end.
+            SettingValue::Real(match unit {
+                _ if unit <= 0.0 && low.is_finite() => low,
+                _ if unit >= 1.0 && high.is_finite() => high,
+                _ => quantile(unit).clamp(low, high),
+            })
+        };
+        match self {
+            Self::Uniform(uniform) => real(&|unit| uniform.inverse_cdf(unit)),
+            Self::Normal(normal) => real(&|unit| normal.value(unit)),
+            Self::List { values, sums } => {
+                let index = sums.partition_point(|sum| *sum <= unit);
+                values[index.min(values.len().saturating_sub(1))].clone()
+            }
+            // The ends of the seeds are those of an integer.
+            Self::Case(seeds) => SettingValue::Integer(seeds.of(case) as i32),
+        }
     }
 
     pub(super) fn in_words(&self) -> String {
-        let ends = |[low, high]: [f64; 2]| format!("{} to {}", shown(low), shown(high));
-        let number = |number: Option<f64>| shown(number.unwrap_or(f64::NAN));
-        let whole = match &self.whole {
-            Whole::Uniform(uniform) => format!("uniform, {}", ends([uniform.min(), uniform.max()])),
-            Whole::Normal(normal) => {
-                let (mean, deviation) = (number(normal.mean()), number(normal.std_dev()));
-                format!("normal, mean {mean}, deviation {deviation}")
+        let range = |[low, high]: [f64; 2]| format!("{} to {}", shown(low), shown(high));
+        match self {
+            Self::Uniform(uniform) => format!("uniform, {}", range([uniform.min(), uniform.max()])),
+            Self::Normal(Truncated { whole, ends, .. }) => {
+                let number = |number: Option<f64>| shown(number.unwrap_or(f64::NAN));
+                let (mean, deviation) = (number(whole.mean()), number(whole.std_dev()));
+                let within = ends.map(|ends| format!(", within {}", range(ends)));
+                let within = within.unwrap_or_default();
+                format!("normal, mean {mean}, deviation {deviation}{within}")
             }
-        };
-        match self.ends {
-            Some(bounds) if self.whole.ends() != Some(bounds) => {
-                format!("{whole}, within {}", ends(bounds))
+            Self::List { values, .. } => {
+                let words = values.iter().take(6).map(|value| match value {
+                    SettingValue::Real(value) => shown(*value),
+                    other => other.to_json().to_string(),
+                });
+                let more = if values.len() > 6 { ", …" } else { "" };
+                format!("one of {}{more}", words.collect::<Vec<_>>().join(", "))
             }
-            _ => whole,
+            Self::Case(seeds) => format!("number of the case + {}", seeds.first),
         }
     }
 }
