@@ -99,8 +99,7 @@ impl Scan {
     fn study(&mut self, file: &Path, study: &Study) -> Result<(), String> {
         for run in &study.runs {
             let experiment = study.experiment(run).map_err(|error| error.to_string())?;
-            let varied = run.varied();
-            refuse_varied(&experiment, varied)?;
+            refuse_varied(&experiment, run.seeds.iter().map(toml::Spanned::get_ref))?;
             self.experiment(file, run.id.get_ref(), &experiment)?;
         }
         Ok(())
@@ -109,10 +108,6 @@ impl Scan {
     fn campaign(&mut self, file: &Path, campaign: &Campaign) -> Result<(), String> {
         let path = campaign.source.beside(campaign.experiment.get_ref());
         let mut experiment = Experiment::load(&path).map_err(|error| error.to_string())?;
-        for (name, fmu) in &campaign.fmu {
-            let component = experiment.components.get_mut(name).ok_or("no such component")?;
-            component.fmu = toml::Spanned::new(0..0, fmu.to_string_lossy().into_owned());
-        }
         for (target, value) in &campaign.set {
             experiment.set(target, value.get_ref().clone())?;
         }
