@@ -14,7 +14,7 @@ use fmi_master::delay::{self, FeedbackLoop, Reading};
 use fmi_master::description::{InterfaceKind, ModelDescription, VariableKind};
 use fmi_master::master::{Master, Member};
 use fmi_master::names;
-use fmi_master::settings::Setting;
+use fmi_master::settings::{Setting, SettingValue};
 use fmi_master::wiring::{self, Part, Port, Wire};
 use fmu_import::fmu::Fmu;
 use serde_json::Value;
@@ -300,7 +300,8 @@ impl System {
         Ok(Run::new(master, interrupt))
     }
 
-    /// Reads the values of all parameters after initialization, except those of type String.
+    /// Reads the values of all parameters after initialization. Of those of type String, which name
+    /// files, it takes those that are set.
     ///
     /// # Errors
     /// Returns an error if an instance cannot be read.
@@ -317,7 +318,11 @@ impl System {
                 let name = part.description.variables[port.variable].name.clone();
                 (name, plain_value(part.description, *port, value))
             });
-            parameters.insert(part.name.to_string(), named.collect());
+            let texts = self.components[component].settings.iter().filter_map(|setting| {
+                matches!(setting.value, SettingValue::Text(_))
+                    .then(|| (setting.name.clone(), setting.value.to_json()))
+            });
+            parameters.insert(part.name.to_string(), named.chain(texts).collect());
         }
         Ok(parameters)
     }
