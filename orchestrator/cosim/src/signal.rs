@@ -175,6 +175,51 @@ impl Signal {
     }
 }
 
+impl Signal {
+    /// Resolves the signal. `find` returns the index of a variable in a sample's values, the factor
+    /// to the unit in which it is displayed, and this unit.
+    ///
+    /// # Errors
+    /// Returns an error if a variable is not found, or if units differ.
+    pub fn resolve(
+        &self,
+        mut find: impl FnMut(&str) -> Result<(usize, f64, String), String>,
+    ) -> Result<Resolved, String> {
+        let mut shown: Option<(f64, String)> = None;
+        let terms = self.terms.iter().map(|term| {
+            let mut place = |path: &str| {
+                let (place, factor, unit) = find(path)?;
+                let (_, other) = shown.get_or_insert_with(|| (factor, unit.clone()));
+                if *other != unit {
+                    return Err(format!("\"{self}\" mixes {other} and {unit}"));
+                }
+                Ok(place)
+            };
+            let value = place(&term.value)?;
+            let with = term.with.as_ref();
+            let with = with.map(|(relation, path)| place(path).map(|place| (*relation, place)));
+            Ok(Term { value, with: with.transpose()? })
+        });
+        let terms = terms.collect::<Result<Vec<_>, String>>()?;
+        let (mut factor, mut unit) = shown.unwrap_or((1.0, String::new()));
+        let turns = terms.iter().filter_map(|term| term.with).map(|with| with.0.whole_turn(&unit));
+        let turns = turns.collect::<Result<Vec<_>, _>>();
+        let turns = turns.map_err(|problem| format!("\"{self}\": {problem}"))?;
+        let whole_turn = turns.into_iter().fold(f64::NAN, f64::max) / factor;
+        let over = self.over.as_deref().map(find).transpose()?;
+        let over = over.map(|(place, divisor, name)| {
+            if name != unit {
+                return Err(format!("\"{self}\" divides {unit} by {name}"));
+            }
+            (factor, unit) = (factor / divisor, String::new());
+            Ok(place)
+        });
+        let (over, norm) = (over.transpose()?, self.norm);
+        let (is_integer, responds) = (false, false);
+        Ok(Resolved { terms, norm, over, whole_turn, factor, unit, is_integer, responds })
+    }
+}
+
 /// A signal whose variables have been found among the values of a sample.
 #[derive(Clone, Debug)]
 pub struct Resolved {

@@ -184,48 +184,16 @@ impl System {
     /// Returns an error if a variable does not exist, or if variables that are combined are not all
     /// in the same unit.
     pub fn resolve(&mut self, signal: &Signal) -> Result<Resolved, String> {
-        let mut shown: Option<(f64, String)> = None;
-        let terms = signal.terms.iter().map(|term| {
-            let mut place = |path: &str| {
-                let probed = self.probe(path)?;
-                let scale = self.display(self.probes[probed.place]);
-                match &shown {
-                    Some(other) if *other != scale => {
-                        return Err(format!("\"{signal}\" mixes {} and {}", other.1, scale.1));
-                    }
-                    _ => shown = Some(scale),
-                }
-                Ok(probed.place)
-            };
-            let value = place(&term.value)?;
-            let with = term.with.as_ref();
-            let with = with.map(|(relation, path)| place(path).map(|place| (*relation, place)));
-            Ok(Term { value, with: with.transpose()? })
-        });
-        let terms = terms.collect::<Result<Vec<_>, String>>()?;
-        let (mut factor, mut unit) = shown.unwrap_or((1.0, String::new()));
-        let turns = terms.iter().filter_map(|term| term.with).map(|with| with.0.whole_turn(&unit));
-        let turns = turns.collect::<Result<Vec<_>, _>>();
-        let turns = turns.map_err(|problem| format!("\"{signal}\": {problem}"))?;
-        let whole_turn = turns.into_iter().fold(f64::NAN, f64::max) / factor;
-        let over = signal
-            .over
-            .as_deref()
-            .map(|path| self.probe(path))
-            .transpose()?
-            .map(|probed| probed.place);
-        if let Some(over) = over {
-            let (divisor, name) = self.display(self.probes[over]);
-            if name != unit {
-                return Err(format!("\"{signal}\" divides {unit} by {name}"));
-            }
-            (factor, unit) = (factor / divisor, String::new());
-        }
+        let resolved = signal.resolve(|path| {
+            let place = self.probe(path)?.place;
+            let (factor, unit) = self.display(self.probes[place]);
+            Ok((place, factor, unit))
+        })?;
+        let terms = &resolved.terms;
         let is_integer = matches!(terms[..], [Term { value, with: None }]
             if !matches!(self.variable_at(self.probes[value]).kind, VariableKind::Real { .. }));
         let responds = terms.iter().flat_map(Term::variables).any(|place| self.is_response(*place));
-        let norm = signal.norm;
-        Ok(Resolved { terms, norm, over, whole_turn, factor, unit, is_integer, responds })
+        Ok(Resolved { is_integer, responds, ..resolved })
     }
 
     fn is_response(&self, place: usize) -> bool {

@@ -113,18 +113,10 @@ pub(crate) fn check_pairs(study: &Study) -> Result<(), String> {
 pub fn judge(claim: &Claim, results: &Results) -> Result<Judged, String> {
     let checks =
         claim.checks.iter().map(|check| compare(check, results)).collect::<Result<Vec<_>, _>>()?;
-    let is_open = |checked: &Checked| checked.verdict() == Verdict::NotJudged;
-    let every_check = |verdict| checks.iter().all(|check| check.verdict() == verdict);
-    let verdict = if checks.is_empty() || checks.iter().any(is_open) {
-        Verdict::NotJudged
-    } else if every_check(Verdict::Holds) {
-        Verdict::Holds
-    } else if every_check(Verdict::DoesNotHold) {
-        Verdict::DoesNotHold
-    } else {
-        Verdict::HoldsPartly
-    };
-    Ok(Judged { verdict, checks })
+    let is_open = checks.iter().any(|checked| checked.pairs == 0);
+    let sum = |count: fn(&Checked) -> usize| checks.iter().map(count).sum();
+    let pairs = if is_open { 0 } else { sum(|checked| checked.pairs) };
+    Ok(Judged { verdict: Verdict::from_counts(sum(|checked| checked.held), pairs), checks })
 }
 
 fn compare(check: &Check, results: &Results) -> Result<Checked, String> {

@@ -11,21 +11,14 @@ use std::fs;
 use std::ops::Range;
 use std::path::PathBuf;
 
-/// Number of cases in a part beyond the first `FEW` cases.
-pub const LENGTH: u64 = 250;
-
-/// Number of cases that are flown in parts of a tenth of this length, so that little work occupies
-/// all cores and loses little when it ends early.
-const FEW: u64 = 2500;
+/// Number of cases in a part: few, so that little work occupies all cores and loses little when it
+/// ends early.
+const LENGTH: u64 = 25;
 
 /// Returns the parts of so many cases. Those of fewer cases are the first of them, except for the
 /// last.
 pub fn parts(cases: u64) -> impl Iterator<Item = Range<u64>> {
-    let of = move |length: u64, cases: u64| {
-        (0..cases.div_ceil(length)).map(move |i| i * length..cases.min((i + 1) * length))
-    };
-    let others = of(LENGTH, cases).skip_while(|part| part.start < FEW);
-    of(LENGTH / 10, cases.min(FEW)).chain(others)
+    (0..cases.div_ceil(LENGTH)).map(move |i| i * LENGTH..cases.min((i + 1) * LENGTH))
 }
 
 /// Folder of the parts that are made from inputs with these hashes.
@@ -127,8 +120,6 @@ mod tests {
             assert!(some.windows(2).all(|pair| pair[0].end == pair[1].start));
             assert_eq!(some[..some.len() - 1], more[..some.len() - 1]);
         }
-        let lengths: Vec<u64> = parts(3000).map(|part| part.end - part.start).collect();
-        assert_eq!((lengths.len(), lengths[99], lengths[100]), (102, 25, 250));
     }
 
     #[test]
