@@ -44,7 +44,8 @@ pub struct CrmpcLaw {
     /// limit.rate; a reference that is that far away is reached about so late.
     #[setting(name = "guarantee.turnTime", unit = "s", nominal = 30.0)]
     turn_time: f64,
-    /// Largest error of the measured angles that the guarantee allows, fast and slow together.
+    /// Largest error of the measured angles that the guarantee allows, fast and slow together; 0 if
+    /// the constraints give none.
     #[setting(name = "guarantee.angleError", unit = "rad", nominal = 0.01)]
     angle_error: f64,
     /// Gain K of the feedback law in force: factor on the {}.
@@ -119,7 +120,10 @@ impl Law for CrmpcLaw {
         self.tracked = Tracked { angles: shown_vector(&memory.tracked.angles), ..memory.tracked };
         self.moment_left = shown(memory.moment_left);
         self.turn_time = shown(memory.turn_time);
-        self.angle_error = settings.angle_error + settings.slow_angle_error;
+        self.angle_error = match settings.constraints {
+            Constraints::Robust => settings.angle_error + settings.slow_angle_error,
+            Constraints::Paper => 0.0,
+        };
         self.gain = [memory.gain.k1, memory.gain.k2];
         self.disturbance = shown_vector(&memory.observed.disturbance);
         self.report = solver::shown_report(&memory.report);
