@@ -82,7 +82,7 @@ BAD = {
     "a lie about a size": ({"more": ("resources/large", b"y" * 100_000, 0o100644), "damage": lying}, ""),
     "an identifier with a zero byte": ({"change": ('modelIdentifier="LQR"', 'modelIdentifier="LQR&#0;"')}, ""),
     "an interface that its library lacks": ({"change": ("CoSimulation", "ModelExchange")}, "could not be instantiated"),
-    "an index beyond the end": ({"change": ('<Unknown index="', '<Unknown index="9')}, "variable 9"),
+    "an index beyond the end": ({"change": ('<Unknown index="', '<Unknown index="9')}, "index 9"),
     "a number that is none": ({"change": ('stepSize="0.04"', 'stepSize="four"')}, DESCRIPTION),
 }
 

@@ -57,9 +57,9 @@ pub(crate) fn run(asked: &Inspect, out: &mut impl Write) -> Result<(), Failure> 
         choose(&mut fmu.description, pattern)?;
     }
     if asked.json {
-        catalogue::print(&fmu, out)?
+        catalogue::print(&fmu, out)?;
     } else {
-        print(&fmu, out)?
+        print(&fmu, out)?;
     }
     Ok(())
 }

@@ -27,6 +27,7 @@ use std::path::{Path, PathBuf};
 
 /// Options of `run`.
 #[derive(Args, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "they are switches of the command line")]
 pub(crate) struct Run {
     /// Folder for the results [default: out/EXPERIMENT].
     #[arg(long, value_name = "DIR", help_heading = "Results")]

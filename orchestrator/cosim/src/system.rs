@@ -286,10 +286,9 @@ impl System {
                 let name = part.description.variables[port.variable].name.clone();
                 (name, plain_value(part.description, *port, value))
             });
-            let texts = self.components[component].settings.iter().filter_map(|setting| {
-                matches!(setting.value, SettingValue::Text(_))
-                    .then(|| (setting.name.clone(), setting.value.to_json()))
-            });
+            let texts = self.components[component].settings.iter();
+            let texts = texts.filter(|setting| matches!(setting.value, SettingValue::Text(_)));
+            let texts = texts.map(|setting| (setting.name.clone(), setting.value.to_json()));
             parameters.insert(part.name.to_string(), named.chain(texts).collect());
         }
         Ok(parameters)

@@ -62,7 +62,7 @@ impl Watched {
     }
 
     #[cold]
-    fn invalid(&self, call: &'static str, kind: Carrier, reference: u32, value: String) -> Outcome {
+    fn invalid(&self, call: &'static str, kind: Carrier, reference: u32, value: &str) -> Outcome {
         let what = match kind {
             Carrier::Real => "not finite",
             Carrier::Integer => "no item of its enumeration",
@@ -95,7 +95,7 @@ impl Instance for Watched {
         self.instance.get_real(references, values)?;
         for (value, &reference) in values.iter().zip(references) {
             if !value.is_finite() {
-                self.invalid("getReal", Carrier::Real, reference, value.to_string())?;
+                self.invalid("getReal", Carrier::Real, reference, &value.to_string())?;
             }
         }
         Ok(())
@@ -105,7 +105,7 @@ impl Instance for Watched {
         self.instance.get_integer(references, values)?;
         for (&value, &reference) in values.iter().zip(references) {
             if !self.is_item(reference, value) {
-                self.invalid("getInteger", Carrier::Integer, reference, value.to_string())?;
+                self.invalid("getInteger", Carrier::Integer, reference, &value.to_string())?;
             }
         }
         Ok(())
@@ -115,7 +115,7 @@ impl Instance for Watched {
         self.instance.get_boolean(references, values)?;
         for (value, &reference) in values.iter().zip(references) {
             if !matches!(value, 0 | 1) {
-                self.invalid("getBoolean", Carrier::Boolean, reference, value.to_string())?;
+                self.invalid("getBoolean", Carrier::Boolean, reference, &value.to_string())?;
             }
         }
         Ok(())

@@ -124,13 +124,14 @@ impl LookupTable {
     /// Returns a text that names a variable that the file has twice.
     pub(crate) fn description(&self, name: &str) -> Result<ModelDescription, String> {
         let items = vec![("hold".into(), HOLD), ("linear".into(), LINEAR)];
-        let columns = || self.columns.iter().map(|column| (&column.name, real(&column.unit)));
+        let columns =
+            || self.columns.iter().map(|column| (&column.name, real(column.unit.clone())));
         let mut entries: Vec<(String, VariableKind)> =
             columns().map(|(name, kind)| (name.clone(), kind)).collect();
         entries.push(("interpolation".into(), VariableKind::Enumeration { items }));
         if self.rows * (1 + self.columns.len()) <= MOST_PARAMETERS {
             let rows = 1..=self.rows;
-            let seconds = || real(&Some("s".into()));
+            let seconds = || real(Some("s".into()));
             entries.extend(rows.clone().map(|row| (format!("time[{row}]"), seconds())));
             entries.extend(rows.flat_map(|row| {
                 columns().map(move |(name, kind)| (format!("{name}[{row}]"), kind))
@@ -198,9 +199,9 @@ fn columns(headings: &csv::StringRecord) -> Result<Vec<Column>, String> {
     Ok(columns)
 }
 
-fn real(unit: &Option<String>) -> VariableKind {
+fn real(unit: Option<String>) -> VariableKind {
     VariableKind::Real {
-        unit: unit.clone(),
+        unit,
         display_unit: None,
         is_relative: false,
         min: None,
