@@ -243,7 +243,7 @@ def test_a_run_that_ends_early_gives_what_it_has():
         experiment("lqr", set={"plant.actuation.delay": 0.8})
     assert caught.value.exit_code == 3
     run = caught.value.run
-    assert run is not None and 1.0 < run.metrics["lost_at"] == run.table["time"].iloc[-1] < 50.0
+    assert run is not None and 1.0 < run.metrics["lost_at"] == run.table.index[-1] < 50.0
 
 
 def test_warnings_of_the_orchestrator_are_warnings():
