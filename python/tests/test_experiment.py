@@ -247,8 +247,8 @@ def test_a_run_that_ends_early_gives_what_it_has():
 
 
 def test_warnings_of_the_orchestrator_are_warnings():
-    with pytest.warns(OrchestratorWarning, match="set controller.delay = 0"):
-        experiment("lqr", set={"controller.delay": 0.04}, stop=1.0)
+    with pytest.warns(OrchestratorWarning, match="disturbance.sine.offset.x has no effect"):
+        experiment("lqr", set={"plant.disturbance.sine.offset.x": 0.01}, stop=1.0)
 
 
 # The command
