@@ -4,10 +4,11 @@
 use crate::flight::Flight;
 use crate::plan::Plan;
 use cosim::error::Error;
+use cosim::signal::Resolved;
 use cosim::variation::SettingValue;
 use cosim_metrics::progress::Parts;
 use cosim_report::figure::{self, Color, Curve, Figure, Shape, with_unit};
-use cosim_report::panels::{self, Panel};
+use cosim_report::panels::Panel;
 use sweep::closed;
 use sweep::runner::{self, Options};
 use sweep::threads::Worked;
@@ -53,7 +54,7 @@ pub(crate) fn draw(
     let threads = runner::threads(options.jobs, [&plan.sweep]);
     let fly = |(flight, panels): &mut (Flight, Vec<Panel>),
                (case, values, stride): &(u64, Vec<SettingValue>, u64)| {
-        let signals = self::curves(panels).map(|(_, curve)| curve.signal.clone()).collect();
+        let signals = self::curves(panels).map(|(_, (_, signal))| signal.clone()).collect();
         let mut track = Track::new(signals, *stride);
         flight.fly_with(*case, values.clone(), &mut [&mut track])?;
         Ok(track)
@@ -77,7 +78,7 @@ pub(crate) fn draw(
     let others: Vec<Track> = tracks.collect();
     let Some(longest) = others.iter().max_by_key(|track| track.time.len()) else { return Ok(None) };
     let time = &longest.time;
-    let panels = curves.iter().enumerate().map(|(place, (panel, curve))| {
+    let panels = curves.iter().enumerate().map(|(place, (panel, (curve, _)))| {
         let scaled = |values: Vec<f64>| values.into_iter().map(|v| v * panel.factor).collect();
         let [low, median, high] = bands(&others, place, time.len()).map(scaled);
         let values = scaled(std::mem::take(&mut bad.values[place]));
@@ -86,7 +87,7 @@ pub(crate) fn draw(
             Curve::new("median", BAND, Shape::Line, time.clone(), median),
             Curve::new(name, WORST, Shape::Line, bad.time.clone(), values),
         ];
-        let label = with_unit(&format!("{} {}", panel.label, curve.name), &panel.unit);
+        let label = with_unit(&format!("{} {curve}", panel.label), &panel.unit);
         figure::Panel::new("time, s", &label, curves)
     });
     let title =
@@ -95,7 +96,7 @@ pub(crate) fn draw(
 }
 
 /// Returns the curves that are drawn, each with its panel.
-fn curves(panels: &[Panel]) -> impl Iterator<Item = (&Panel, &panels::Curve)> {
+fn curves(panels: &[Panel]) -> impl Iterator<Item = (&Panel, &(String, Resolved))> {
     panels.iter().flat_map(|panel| panel.curves.iter().map(move |c| (panel, c))).take(PANELS)
 }
 

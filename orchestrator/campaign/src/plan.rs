@@ -6,7 +6,8 @@ use cosim::error::Error;
 use cosim::files;
 use cosim::system::Opened;
 use cosim_metrics::metrics::{Meters, Metrics};
-use std::collections::BTreeSet;
+use serde_json::json;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use sweep::cases::Sweep;
 use sweep::vary::Variation;
@@ -90,8 +91,11 @@ impl Plan {
 
     /// Returns units by column, as JSON for the metadata of a table.
     pub fn units(&self) -> String {
-        let recorded = self.recorded.iter().map(|entry| (&entry.name, &entry.unit));
-        self.sweep.units(recorded)
+        let recorded = self.recorded.iter().map(|entry| (entry.name.as_str(), entry.unit.as_str()));
+        let varied =
+            self.sweep.varied.iter().map(|entry| (entry.name.as_str(), entry.unit.as_str()));
+        let units = varied.chain(recorded).chain([("time", "s")]);
+        json!(units.filter(|(_, unit)| !unit.is_empty()).collect::<BTreeMap<_, _>>()).to_string()
     }
 
     /// Refuses columns of the table of cases that would have the same name.

@@ -8,29 +8,14 @@ use cosim::system::System;
 /// A panel whose signals have been found.
 #[derive(Clone, Debug, Default)]
 pub struct Panel {
-    /// Short name of the panel.
-    pub name: String,
     /// Label of the vertical axis without the unit.
     pub label: String,
     /// Unit of all values in the panel.
     pub unit: String,
     /// Factor from the unit of the signals to the unit of the panel.
     pub factor: f64,
-    /// Curves of the panel, with their names and signals.
-    pub curves: Vec<Curve>,
-    /// Limit of the norm of all curves.
-    pub limit: Option<Resolved>,
-}
-
-/// A curve of a panel.
-#[derive(Clone, Debug)]
-pub struct Curve {
-    /// Name of the curve in the legend.
-    pub name: String,
-    /// Signal that is drawn as the curve.
-    pub signal: Resolved,
-    /// Signal that the curve is to follow, if any.
-    pub reference: Option<Resolved>,
+    /// Names and signals of the curves.
+    pub curves: Vec<(String, Resolved)>,
 }
 
 impl Panel {
@@ -59,20 +44,18 @@ impl Panel {
             }
             system.resolve(signal).map(Some)
         };
-        let mut curves = Vec::new();
+        let (mut curves, mut others) = (Vec::new(), Vec::new());
         for experiment::Curve { name, of, reference } in &requested.curves {
-            let reference = reference.as_ref().map(&mut resolve).transpose()?.flatten();
-            let signal = resolve(of)?;
-            curves.extend(signal.map(|signal| Curve { name: name.clone(), signal, reference }));
+            curves.extend(resolve(of)?.map(|signal| (name.clone(), signal)));
+            others.extend(reference.as_ref().map(&mut resolve).transpose()?.flatten());
         }
-        let limit = requested.limit.as_ref().map(&mut resolve).transpose()?.flatten();
-        let followed = curves.iter().filter_map(|curve| curve.reference.as_ref());
-        let drawn = curves.iter().map(|curve| &curve.signal).chain(followed).chain(&limit);
+        others.extend(requested.limit.as_ref().map(&mut resolve).transpose()?.flatten());
+        let drawn = curves.iter().map(|(_, signal)| signal).chain(&others);
         let signal_unit = common_unit(drawn)?.to_string();
         let shown = requested.unit.as_ref().or_else(|| units.get(&signal_unit));
         let (unit, factor) =
             shown.map_or((signal_unit, 1.0), |unit| (unit.name.clone(), unit.factor));
         let label = if requested.label.is_empty() { &requested.name } else { &requested.label };
-        Ok(Self { name: requested.name.clone(), label: label.clone(), unit, factor, curves, limit })
+        Ok(Self { label: label.clone(), unit, factor, curves })
     }
 }

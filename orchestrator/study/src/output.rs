@@ -57,7 +57,7 @@ impl Report {
             files.push(name);
         }
         files::write(&out.join("results.json"), numbers(results, &self.judged))?;
-        let origin = origin::origin(results.study);
+        let origin = origin::origin();
         let page = page::page(results, &self.judged, &self.figures, &self.tables, &origin);
         files::write(&out.join("report.html"), page)?;
         Ok(files)

@@ -14,7 +14,6 @@ use cosim::system::{CheckedComponent, Opened, System};
 use cosim::variation::{SettingValue, Target};
 use fmi_master::names;
 use parking_lot::Mutex;
-use serde_json::{Map, Value, json};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::fs;
@@ -195,16 +194,6 @@ impl Sweep {
             Some(path) if !search::fmu_folders().iter().any(is_there) => path.display().to_string(),
             _ => written.clone(),
         }
-    }
-    /// Returns the units of the varied parameters and of other columns, as JSON for the metadata
-    /// of a table.
-    pub fn units<'a>(&'a self, others: impl Iterator<Item = (&'a String, &'a String)>) -> String {
-        let varied = self.varied.iter().map(|entry| (&entry.name, &entry.unit));
-        let units = varied.chain(others).filter(|(_, unit)| !unit.is_empty());
-        let mut units: Map<String, Value> =
-            units.map(|(name, unit)| (name.clone(), json!(unit))).collect();
-        units.insert("time".into(), json!("s"));
-        Value::Object(units).to_string()
     }
 }
 

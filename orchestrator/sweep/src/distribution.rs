@@ -3,11 +3,14 @@
 mod reader;
 mod shape;
 
+use crate::texts::shown;
 use crate::vary::Vary;
 use cosim::system::System;
 use cosim::variation::{SettingValue, Target};
 use reader::Reader;
-use shape::Shape;
+use shape::{Shape, Truncated};
+use statrs::distribution::ContinuousCDF;
+use statrs::statistics::{Distribution as _, Max, Min};
 
 /// Distribution of the values of a parameter.
 #[derive(Clone, Debug)]
@@ -53,11 +56,6 @@ impl Distribution {
         }
     }
 
-    /// Returns the distribution in words.
-    pub fn in_words(&self) -> String {
-        self.0.in_words()
-    }
-
     /// Returns the texts among the values.
     pub(crate) fn texts(&self) -> impl Iterator<Item = &str> {
         let values = if let Shape::List { values, .. } = &self.0 { &values[..] } else { &[] };
@@ -76,6 +74,50 @@ impl Distribution {
     /// Returns the quantile of this probability for the case with this number. Those of 0 and 1 are
     /// the ends.
     pub fn value(&self, unit: f64, case: u64) -> SettingValue {
-        self.0.value(unit, case)
+        let [low, high] = self.0.ends().unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        let real = |quantile: &dyn Fn(f64) -> f64| {
+            // Rounding must not miss an end.
+            SettingValue::Real(match unit {
+                _ if unit <= 0.0 && low.is_finite() => low,
+                _ if unit >= 1.0 && high.is_finite() => high,
+                _ => quantile(unit).clamp(low, high),
+            })
+        };
+        match &self.0 {
+            Shape::Uniform(uniform) => real(&|unit| uniform.inverse_cdf(unit)),
+            Shape::Normal(normal) => real(&|unit| normal.value(unit)),
+            Shape::List { values, sums } => {
+                let index = sums.partition_point(|sum| *sum <= unit);
+                values[index.min(values.len().saturating_sub(1))].clone()
+            }
+            // The ends of the seeds are those of an integer.
+            Shape::Case(seeds) => SettingValue::Integer(seeds.of(case) as i32),
+        }
+    }
+
+    /// Returns the distribution in words.
+    pub fn in_words(&self) -> String {
+        let range = |[low, high]: [f64; 2]| format!("{} to {}", shown(low), shown(high));
+        match &self.0 {
+            Shape::Uniform(uniform) => {
+                format!("uniform, {}", range([uniform.min(), uniform.max()]))
+            }
+            Shape::Normal(Truncated { whole, ends, .. }) => {
+                let number = |number: Option<f64>| shown(number.unwrap_or(f64::NAN));
+                let (mean, deviation) = (number(whole.mean()), number(whole.std_dev()));
+                let within = ends.map(|ends| format!(", within {}", range(ends)));
+                let within = within.unwrap_or_default();
+                format!("normal, mean {mean}, deviation {deviation}{within}")
+            }
+            Shape::List { values, .. } => {
+                let words = values.iter().take(6).map(|value| match value {
+                    SettingValue::Real(value) => shown(*value),
+                    other => other.to_json().to_string(),
+                });
+                let more = if values.len() > 6 { ", …" } else { "" };
+                format!("one of {}{more}", words.collect::<Vec<_>>().join(", "))
+            }
+            Shape::Case(seeds) => format!("number of the case + {}", seeds.first),
+        }
     }
 }

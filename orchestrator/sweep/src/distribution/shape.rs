@@ -1,9 +1,8 @@
 //! The shapes of distributions, and their quantile functions.
 
-use crate::texts::shown;
 use cosim::variation::SettingValue;
 use statrs::distribution::{ContinuousCDF, Normal, Uniform};
-use statrs::statistics::{Distribution as _, Max, Min};
+use statrs::statistics::{Max, Min};
 
 /// Smallest part of a distribution that a truncation may leave, as a share of all up to there.
 const SMALLEST: f64 = 1e-9;
@@ -59,7 +58,7 @@ impl Seeds {
 /// A normal distribution, which may be truncated.
 #[derive(Clone, Debug)]
 pub(super) struct Truncated {
-    whole: Normal,
+    pub(super) whole: Normal,
     /// Probabilities between which the quantiles lie.
     between: [f64; 2],
     /// Smallest and largest value, if there are any.
@@ -89,7 +88,7 @@ impl Truncated {
     }
 
     /// Returns the quantile of a probability between 0 and 1.
-    fn value(&self, unit: f64) -> f64 {
+    pub(super) fn value(&self, unit: f64) -> f64 {
         let [from, to] = self.between;
         // The ends of the whole distribution are infinite.
         let unit = (from + unit * (to - from)).clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0);
@@ -109,53 +108,6 @@ impl Shape {
             Self::Uniform(uniform) => Some([uniform.min(), uniform.max()]),
             Self::Normal(normal) => normal.ends,
             Self::List { .. } | Self::Case(_) => None,
-        }
-    }
-
-    /// Returns the quantile of this probability for the case with this number. Those of 0 and 1 are
-    /// the ends.
-    pub(super) fn value(&self, unit: f64, case: u64) -> SettingValue {
-        let [low, high] = self.ends().unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-        let real = |quantile: &dyn Fn(f64) -> f64| {
-            // Rounding must not miss an end.
-            SettingValue::Real(match unit {
-                _ if unit <= 0.0 && low.is_finite() => low,
-                _ if unit >= 1.0 && high.is_finite() => high,
-                _ => quantile(unit).clamp(low, high),
-            })
-        };
-        match self {
-            Self::Uniform(uniform) => real(&|unit| uniform.inverse_cdf(unit)),
-            Self::Normal(normal) => real(&|unit| normal.value(unit)),
-            Self::List { values, sums } => {
-                let index = sums.partition_point(|sum| *sum <= unit);
-                values[index.min(values.len().saturating_sub(1))].clone()
-            }
-            // The ends of the seeds are those of an integer.
-            Self::Case(seeds) => SettingValue::Integer(seeds.of(case) as i32),
-        }
-    }
-
-    pub(super) fn in_words(&self) -> String {
-        let range = |[low, high]: [f64; 2]| format!("{} to {}", shown(low), shown(high));
-        match self {
-            Self::Uniform(uniform) => format!("uniform, {}", range([uniform.min(), uniform.max()])),
-            Self::Normal(Truncated { whole, ends, .. }) => {
-                let number = |number: Option<f64>| shown(number.unwrap_or(f64::NAN));
-                let (mean, deviation) = (number(whole.mean()), number(whole.std_dev()));
-                let within = ends.map(|ends| format!(", within {}", range(ends)));
-                let within = within.unwrap_or_default();
-                format!("normal, mean {mean}, deviation {deviation}{within}")
-            }
-            Self::List { values, .. } => {
-                let words = values.iter().take(6).map(|value| match value {
-                    SettingValue::Real(value) => shown(*value),
-                    other => other.to_json().to_string(),
-                });
-                let more = if values.len() > 6 { ", …" } else { "" };
-                format!("one of {}{more}", words.collect::<Vec<_>>().join(", "))
-            }
-            Self::Case(seeds) => format!("number of the case + {}", seeds.first),
         }
     }
 }
