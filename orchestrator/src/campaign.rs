@@ -49,8 +49,9 @@ struct Part {
     /// everything recorded.
     #[arg(long, value_name = "K", conflicts_with_all = ["cases", "work", "worst", "fresh"])]
     case: Option<u64>,
-    /// Fly only the cases from FIRST up to, but not including, LAST. A later command for the whole
-    /// campaign merges them. Several processes may work in the same folder at once.
+    /// Fly only the parts that begin at a case from FIRST up to, but not including, LAST. A later
+    /// command for the whole campaign merges them. Several processes may work in the same folder at
+    /// once.
     #[arg(long, value_name = "FIRST..LAST", value_parser = range, allow_hyphen_values = true, conflicts_with_all = ["work", "worst"])]
     cases: Option<Range<u64>>,
     /// Print which parts of the campaign are not flown yet, as JSON, and fly no case.

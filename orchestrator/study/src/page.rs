@@ -230,7 +230,7 @@ fn origins(results: &Results, origin: &[(String, String)]) -> Markup {
     html! {
         p {
             "Orchestrator " (env!("CARGO_PKG_VERSION")) " made " (runs) " simulation runs. All numbers of this page are in "
-            code { "results.json" } ". The folder " code { "runs" } " holds the signals of the first run of each row below. "
+            code { "results.json" } ", and the folder " code { "runs" } " keeps what a repetition need not fly again. "
             "A repetition gives the same bits, except for computing times."
         }
         (table(&[], known))
