@@ -29,8 +29,7 @@ pub(super) fn recording(path: &Path) -> Result<Recording, Error> {
         );
         return Err(Error::experiment(problem));
     }
-    let columns = text(&file)?;
-    let mut columns = columns.into_iter();
+    let mut columns = text(&file)?.into_iter();
     let first = columns.next().filter(|(name, _)| name.eq_ignore_ascii_case("time"));
     let Some((_, time)) = first else {
         let problem = format!("{}: the first column must be called time", file.display());
@@ -107,26 +106,11 @@ fn json_of(path: &Path) -> Result<Value, Error> {
 
 /// Makes a track of a column, which `results.json` describes.
 fn track(column: &Value, values: Vec<f64>) -> Track {
-    let unit = column["unit"].as_str().unwrap_or_default();
-    let (unit, factor) = if column["display_unit"].is_null() {
-        usual_unit(unit)
-    } else {
-        display_unit(&column["display_unit"])
-    };
+    let (unit, factor) = display_unit(&column["display_unit"]);
     let items = column["items"].as_object().into_iter().flatten();
     let items =
         items.filter_map(|(value, name)| Some((name.as_str()?.into(), value.parse().ok()?)));
     Track { unit, factor, items: items.collect(), values }
-}
-
-/// Returns the unit in which values are displayed if no FMU says so.
-fn usual_unit(unit: &str) -> (String, f64) {
-    match unit.strip_prefix("rad") {
-        Some(rest) if rest.is_empty() || rest.starts_with('/') => {
-            (format!("deg{rest}"), 1.0_f64.to_degrees())
-        }
-        _ => (unit.into(), 1.0),
-    }
 }
 
 /// Reads a CSV file.
