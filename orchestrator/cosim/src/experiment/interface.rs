@@ -37,18 +37,14 @@ impl Experiment {
         let [steps, exchanges] = [InterfaceKind::CoSimulation, exchange]
             .map(|kind| fmu.description.interface(kind).is_some());
         let file = fmu.path.file_name().unwrap_or_default().to_string_lossy();
-        let kind = match interface {
-            // An FMU that takes the place of another one is called by the interface that it has.
-            _ if *is_exchanged && steps != exchanges => exchange_if(exchanges, exchange),
-            Some(Interface::ModelExchange) if !exchanges => {
-                return refuse(format!("interface: {file} offers no model exchange"));
-            }
-            Some(Interface::CoSimulation) if !steps => {
-                return refuse(format!("interface: {file} offers no co-simulation"));
-            }
-            Some(interface) => exchange_if(*interface == Interface::ModelExchange, exchange),
-            None => exchange_if(exchanges && !steps, exchange),
-        };
+        // An FMU in place of another one may offer the other interface only.
+        let asked = interface.filter(|_| !is_exchanged || steps == exchanges);
+        let is_exchange =
+            asked.map_or(exchanges && !steps, |asked| asked == Interface::ModelExchange);
+        let kind = if is_exchange { exchange } else { InterfaceKind::CoSimulation };
+        if asked.is_some() && fmu.description.interface(kind).is_none() {
+            return refuse(format!("interface: {file} offers no {}", kind.name()));
+        }
         match tolerance {
             Some(tolerance) if !TOLERANCES.contains(tolerance) => {
                 refuse(format!("tolerance = {tolerance}: it must be from 1e-13 to 0.1"))
@@ -61,8 +57,4 @@ impl Experiment {
             _ => Ok(kind),
         }
     }
-}
-
-fn exchange_if(exchanges: bool, exchange: InterfaceKind) -> InterfaceKind {
-    if exchanges { exchange } else { InterfaceKind::CoSimulation }
 }
