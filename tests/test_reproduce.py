@@ -200,7 +200,7 @@ def test_a_signal_ends_it_and_keeps_what_is_finished(tmp_path):
     command = [program("orchestrator"), "reproduce", EXPERIMENTS, "--out", out, "--fmu-dir", TARGET / "fmu", "--quiet"]
     environment = {**os.environ, "TMPDIR": str(temporary)}
     process = started(command, stderr=subprocess.PIPE, text=True, env=environment)
-    while len(list(out.glob("runs/*/*.part"))) < 3:
+    while len(list(out.glob("runs/*/*.cases"))) < 3:
         assert process.poll() is None
         time.sleep(0.02)
     # A second process must wait.
@@ -247,7 +247,7 @@ right = 1.0
     assert "not judged" in finished.stdout
     (claim,) = json.loads((tmp_path / "out" / "results.json").read_text())["claims"]
     assert claim["verdict"] == "not-judged" and claim["checks"][0]["label"] == "mean"
-    assert "disturbance.seed has no effect" in finished.stderr
+    assert "lqr: plant.disturbance.seed has no effect, all 3 runs are the same" in finished.stdout
     assert re.search(r"lqr: the attitude is lost in 3 of 3 runs, at t = \S+ s or later", finished.stdout)
 
 

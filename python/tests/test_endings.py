@@ -225,7 +225,7 @@ def test_an_orchestrator_that_is_killed_is_no_result(short, tmp_path, temporary)
     if sys.platform == "linux":
         with pytest.raises(OrchestratorError, match="was ended by SIGKILL"):
             campaign(short, law=Worker(kill_orchestrator)).run(out=tmp_path / "out", jobs=1)
-        assert not list(tmp_path.glob("out/parts/*.part"))
+        assert not list(tmp_path.glob("out/parts/*.cases"))
         with pytest.raises(OrchestratorError, match="was ended by SIGKILL"):
             experiment("lqr", stop=1.0, law=Worker(kill_orchestrator))
 

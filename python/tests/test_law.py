@@ -101,11 +101,11 @@ def test_the_bytes_do_not_depend_on_processes(file, by_law, tmp_path):
 def test_what_is_flown_is_not_flown_again_by_the_same_law(file, by_law):
     parts = by_law.folder / "parts"
     times = {path.name: path.stat().st_mtime_ns for path in parts.iterdir()}
-    (parts / "0000000025-0000000030.part").unlink()
+    (parts / "0000000025-0000000030.cases").unlink()
     assert campaign(file, law=lqr).run(out=by_law.folder).table.equals(by_law.table)
     after = {path.name: path.stat().st_mtime_ns for path in parts.iterdir()}
     assert [name for name in times if times[name] != after[name]] == [
-        "0000000025-0000000030.part"
+        "0000000025-0000000030.cases"
     ]
 
 
@@ -241,13 +241,13 @@ def test_an_interruption_keeps_what_is_flown(tmp_path):
         [sys.executable, program], cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True, **USUAL
     )
     parts = tmp_path / "out" / "parts"
-    while len(list(parts.glob("*.part"))) < 2:
+    while len(list(parts.glob("*.cases"))) < 2:
         assert process.poll() is None
         time.sleep(0.05)
     process.send_signal(signal.SIGINT)
     _, error = process.communicate()
     assert process.returncode != 0 and error.rstrip().endswith("KeyboardInterrupt")
-    kept = sorted(path.name for path in parts.glob("*.part"))
+    kept = sorted(path.name for path in parts.glob("*.cases"))
     left = json.loads(
         campaign(tmp_path / "gusts.toml", law=pd_law).call(
             "--work", "--out", str(tmp_path / "out")
@@ -256,7 +256,7 @@ def test_an_interruption_keeps_what_is_flown(tmp_path):
     assert len(left) == 200 - len(kept)
     # Nothing flies on.
     time.sleep(1.0)
-    assert sorted(path.name for path in parts.glob("*.part")) == kept
+    assert sorted(path.name for path in parts.glob("*.cases")) == kept
 
 
 @pytest.mark.parametrize("answer", [b"", bytes(80)])

@@ -114,7 +114,8 @@ fn members(result: &RunResult) -> Vec<Value> {
     parts.flat_map(|part| (0..part.rows()).map(move |at| row(part, at))).collect()
 }
 
-/// Describes a quick look, and the runs that are lost.
+/// Describes a quick look, the runs that are lost, and those whose seeds have no effect, for example
+/// that of a constant disturbance.
 pub(crate) fn notes(results: &Results) -> Vec<String> {
     let mut notes = Vec::from_iter(page::quickly(results.study));
     for (run, result) in results.pairs() {
@@ -129,6 +130,21 @@ pub(crate) fn notes(results: &Results) -> Vec<String> {
                 lost.len()
             ));
         }
+        if count > 1 && is_constant(run, result) {
+            let seeds: Vec<&str> = run.seeds.iter().map(|seed| seed.get_ref().as_str()).collect();
+            let seeds = seeds.join(" and ");
+            notes.push(format!("{id}: {seeds} has no effect, all {count} runs are the same"));
+        }
     }
     notes
+}
+
+/// Returns whether all cases of a run have the same results, apart from computing times.
+fn is_constant(run: &Run, result: &RunResult) -> bool {
+    let metrics = run.observe.metrics.iter().filter(|(_, measure)| !measure.timing);
+    let measures = run.measures.iter().map(|id| format!("measure.{}", id.get_ref()));
+    metrics.map(|(name, _)| name.clone()).chain(measures).all(|name| {
+        let numbers = result.column(&name);
+        numbers.iter().all(|number| *number == numbers[0])
+    })
 }

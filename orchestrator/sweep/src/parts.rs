@@ -41,7 +41,7 @@ pub struct PartResult {
 impl Store<'_> {
     /// Returns the path of a part's file.
     fn path(&self, part: &Range<u64>) -> PathBuf {
-        self.folder.join(format!("{:010}-{:010}.part", part.start, part.end))
+        self.folder.join(format!("{:010}-{:010}.cases", part.start, part.end))
     }
 
     /// Looks for a part.

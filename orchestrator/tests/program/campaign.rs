@@ -159,7 +159,7 @@ fn the_same_bytes_however_the_cases_were_flown() {
     assert!(said.contains("1100 cases, 50 flown now"), "{said}");
     assert_eq!(bytes("b"), whole);
     // A damaged part is flown again, whichever bit was changed.
-    let part = bench.path("b/parts/0000000250-0000000275.part");
+    let part = bench.path("b/parts/0000000250-0000000275.cases");
     let sound = fs::read(&part).unwrap();
     for place in (0..sound.len()).step_by(sound.len() / 40) {
         let mut broken = sound.clone();
