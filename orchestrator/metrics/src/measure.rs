@@ -23,8 +23,15 @@ pub(crate) struct Gauge {
     signals: Vec<Resolved>,
     /// Index of the variable that counts events, and its last value.
     each: Option<(usize, f64)>,
-    /// Values of each signal: the present one, the one before, and the first one.
+    /// Present value of each signal.
     now: Vec<f64>,
+    seen: Seen,
+}
+
+/// What the samples so far have shown.
+#[derive(Default)]
+struct Seen {
+    /// Values of each signal: those before the present ones, and the first ones.
     before: Vec<f64>,
     first: Vec<f64>,
     sum: f64,
@@ -69,77 +76,50 @@ impl Gauge {
         let responds = signals.iter().any(|signal| signal.responds);
         let steps = measure.steps || responds && quantity != Quantity::Integral;
         let each = measure.each.as_ref().map(|path| system.probe(path)).transpose()?;
-        let mut gauge = Self::empty(&Measure { steps, ..measure.clone() }, quantity, signals);
-        gauge.each = each.map(|probed| (probed.place, 0.0));
-        if quantity == Quantity::P99 {
-            // This is enough room for a usual run; a longer run allocates more.
-            gauge.samples.reserve(system.clock.ticks().min(1 << 16) as usize + 1);
-        }
-        Ok(gauge)
+        let gauge = Self::empty(&Measure { steps, ..measure.clone() }, quantity, signals);
+        Ok(Self { each: each.map(|probed| (probed.place, 0.0)), ..gauge })
     }
 
     pub(crate) fn empty(measure: &Measure, quantity: Quantity, signals: Vec<Resolved>) -> Self {
-        Self {
-            measure: measure.clone(),
-            quantity,
-            signals,
-            each: None,
-            now: Vec::new(),
-            before: Vec::new(),
-            first: Vec::new(),
-            sum: 0.0,
-            integral: 0.0,
-            count: 0,
-            largest: 0.0,
-            pulses: 0,
-            samples: Vec::new(),
-            spectrum_samples: Vec::new(),
-            began: 0.0,
-            variation: 0.0,
-            rises: 0,
-            inside: 0,
-            settled: None,
-            last: 0.0,
-            left: None,
-        }
+        let (measure, each, now, seen) = (measure.clone(), None, Vec::new(), Seen::default());
+        Self { measure, quantity, signals, each, now, seen }
     }
 
     /// Forgets all samples, so that another run can be measured.
     pub(crate) fn reset(&mut self) {
-        let signals = std::mem::take(&mut self.signals);
-        let each = self.each.map(|(place, _)| (place, 0.0));
-        *self = Self { each, ..Self::empty(&self.measure, self.quantity, signals) };
+        self.seen = Seen::default();
+        self.each = self.each.map(|(place, _)| (place, 0.0));
     }
 
     /// Returns the value of the measure; `None` if it has none.
     pub(crate) fn value(&self) -> Option<f64> {
         let factor = self.measure.unit.as_ref().map_or(1.0, |unit| unit.factor);
-        (self.count > 0).then_some(())?;
-        let count = self.count as f64;
+        (self.seen.count > 0).then_some(())?;
+        let count = self.seen.count as f64;
         match self.quantity {
-            Quantity::Rms => Some(factor * (self.sum / count).sqrt()),
-            Quantity::Mean => Some(factor * (self.sum / count)),
-            Quantity::Integral => Some(factor * self.integral),
+            Quantity::Rms => Some(factor * (self.seen.sum / count).sqrt()),
+            Quantity::Mean => Some(factor * (self.seen.sum / count)),
+            Quantity::Integral => Some(factor * self.seen.integral),
             Quantity::P99 => {
-                let mut samples = self.samples.clone();
+                let mut samples = self.seen.samples.clone();
                 samples.sort_by(f64::total_cmp);
                 let rank = (samples.len() * 99).div_ceil(100).checked_sub(1)?;
                 samples.get(rank).map(|sample| factor * sample)
             }
-            Quantity::Largest => Some(factor * self.largest),
-            Quantity::Last => self.before.first().map(|value| factor * value),
+            Quantity::Largest => Some(factor * self.seen.largest),
+            Quantity::Last => self.seen.before.first().map(|value| factor * value),
             Quantity::Settling { hold, .. } => {
-                self.settled.filter(|settled| self.last - settled >= hold)
+                self.seen.settled.filter(|settled| self.seen.last - settled >= hold)
             }
-            Quantity::Pulses => Some(self.pulses as f64),
-            Quantity::Leaving { .. } => self.left,
-            Quantity::Rises { .. } => Some(self.rises as f64),
-            Quantity::Variation => Some(factor * self.variation),
-            Quantity::Share { .. } => Some(self.inside as f64 / count),
+            Quantity::Pulses => Some(self.seen.pulses as f64),
+            Quantity::Leaving { .. } => self.seen.left,
+            Quantity::Rises { .. } => Some(self.seen.rises as f64),
+            Quantity::Variation => Some(factor * self.seen.variation),
+            Quantity::Share { .. } => Some(self.seen.inside as f64 / count),
             Quantity::RmsAbove { frequency } => {
-                let step = (self.last - self.began) / (count - 1.0);
-                let signals = self.first.len();
-                spectrum::rms_above(&self.spectrum_samples, signals, step, frequency)
+                let step = (self.seen.last - self.seen.began) / (count - 1.0);
+                let signals = self.seen.first.len();
+                spectrum::rms_above(&self.seen.spectrum_samples, signals, step, frequency)
                     .map(|rms| factor * rms)
             }
         }
@@ -165,70 +145,74 @@ impl Gauge {
     /// Returns the single values of a percentile, in the order of time.
     pub(crate) fn samples(&self) -> Vec<f64> {
         let factor = self.measure.unit.as_ref().map_or(1.0, |unit| unit.factor);
-        self.samples.iter().map(|sample| factor * sample).collect()
+        self.seen.samples.iter().map(|sample| factor * sample).collect()
     }
 
     fn see(&mut self, time: f64, values: &[f64]) {
         if self.measure.over.is_some_and(|[from, to]| !(from..=to).contains(&time)) {
             return;
         }
-        if self.count == 0 {
-            self.first = values.to_vec();
-            self.before = vec![0.0; values.len()];
-            self.began = time;
+        if self.seen.count == 0 {
+            self.seen.first = values.to_vec();
+            self.seen.before = vec![0.0; values.len()];
+            self.seen.began = time;
         } else {
-            let changes = values.iter().zip(&self.before).map(|(now, before)| (now - before).abs());
-            self.variation += changes.sum::<f64>();
-            let rise = values.first().zip(self.before.first()).map(|(now, before)| now - before);
+            let changes =
+                values.iter().zip(&self.seen.before).map(|(now, before)| (now - before).abs());
+            self.seen.variation += changes.sum::<f64>();
+            let rise =
+                values.first().zip(self.seen.before.first()).map(|(now, before)| now - before);
             if let Quantity::Rises { least } = self.quantity {
-                self.rises += u64::from(rise.is_some_and(|rise| rise > least));
+                self.seen.rises += u64::from(rise.is_some_and(|rise| rise > least));
             }
         }
         if matches!(self.quantity, Quantity::RmsAbove { .. }) {
-            self.spectrum_samples.extend(values);
+            self.seen.spectrum_samples.extend(values);
         }
         // By the trapezoidal rule. At the first sample, the values before it are zero and no time
         // has passed.
         if let (true, Some(now), Some(before)) =
-            (self.count > 0, values.first(), self.before.first())
+            (self.seen.count > 0, values.first(), self.seen.before.first())
         {
-            self.integral += 0.5 * (now + before) * (time - self.last);
+            self.seen.integral += 0.5 * (now + before) * (time - self.seen.last);
         }
-        self.count += 1;
-        self.last = time;
-        self.sum += match self.quantity {
+        self.seen.count += 1;
+        self.seen.last = time;
+        self.seen.sum += match self.quantity {
             Quantity::Mean => values.first().copied().unwrap_or(f64::NAN),
             _ => values.iter().map(|value| value * value).sum(),
         };
         if self.quantity == Quantity::P99 {
-            self.samples.extend(values.first());
+            self.seen.samples.extend(values.first());
         }
-        self.largest = values.iter().map(|value| value.abs()).fold(self.largest, larger);
+        self.seen.largest = values.iter().map(|value| value.abs()).fold(self.seen.largest, larger);
         match self.quantity {
             Quantity::Settling { within, .. } => {
                 let band = |first: &f64| match within {
                     Band::Absolute(bound) => bound,
                     Band::Relative(share) => share * first.abs(),
                 };
-                let inside =
-                    values.iter().zip(&self.first).all(|(value, first)| value.abs() <= band(first));
-                self.settled = if inside { self.settled.or(Some(time)) } else { None };
+                let inside = values
+                    .iter()
+                    .zip(&self.seen.first)
+                    .all(|(value, first)| value.abs() <= band(first));
+                self.seen.settled = if inside { self.seen.settled.or(Some(time)) } else { None };
             }
             Quantity::Leaving { bound } if values.iter().any(|value| value.abs() > bound) => {
-                self.left = self.left.or(Some(time));
+                self.seen.left = self.seen.left.or(Some(time));
             }
             Quantity::Share { bound } => {
                 let bound = bound * (1.0 + ROUNDING);
-                self.inside += u64::from(values.iter().all(|value| value.abs() <= bound));
+                self.seen.inside += u64::from(values.iter().all(|value| value.abs() <= bound));
             }
             _ => {}
         }
         let rises = values
             .iter()
-            .zip(&self.before)
+            .zip(&self.seen.before)
             .filter(|(value, before)| **value > 0.5 && **before <= 0.5);
-        self.pulses += rises.count() as u64;
-        self.before.copy_from_slice(values);
+        self.seen.pulses += rises.count() as u64;
+        self.seen.before.copy_from_slice(values);
     }
 
     /// Returns whether a sample is one of those that the measure uses.

@@ -33,7 +33,7 @@ use std::path::Path;
 use toml::{Spanned, Value};
 
 /// An experiment as its file describes it.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
     /// Title of the experiment, in one line.
@@ -81,7 +81,7 @@ pub struct Experiment {
 }
 
 /// Simulated time span, communication step and coupling.
-#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Simulation {
     /// Start time of the simulation, s.
@@ -174,7 +174,7 @@ pub struct Connection {
 }
 
 /// Variables that are written to the results.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
     /// Names of the variables, as `component.variable` or `component.prefix.*`.

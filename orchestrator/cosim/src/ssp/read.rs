@@ -4,9 +4,7 @@ use super::structure::{Structure, SystemComponent};
 use super::{STRUCTURE, flow};
 use crate::document::Source;
 use crate::error::Error;
-use crate::experiment::{
-    Component, Coupling, Experiment, Observe, OnInvalid, Overrides, Protection, Record, Simulation,
-};
+use crate::experiment::{Component, Experiment, Overrides, Record, Simulation};
 use crate::system::Opened;
 use crate::wiring::wires;
 use fmi_master::delay;
@@ -16,8 +14,8 @@ use fmu_import::error::Error as Import;
 use fmu_import::fmu::Fmu;
 use fmu_import::folder::TemporaryFolder;
 use fmu_import::xml::{self, Element};
+use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
-use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use toml::{Spanned, Value};
@@ -87,7 +85,6 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
 
     let components = structure.components.iter().zip(parameters);
     let mut experiment = Experiment {
-        vehicle: None,
         title: root.attribute("name").unwrap_or("system").to_string(),
         description: root.attribute("description").unwrap_or_default().to_string(),
         simulation: simulation(&root, &parts, overrides, &refuse)?,
@@ -96,14 +93,9 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
             .collect(),
         connections,
         record: Record { variables: recorded(&parts), every: 1 },
-        observe: Observe::default(),
-        isolation: Protection::default(),
         leaves_inputs_open: true,
-        assigned: BTreeSet::new(),
-        law: None,
-        unplaced: Vec::new(),
-        given: Overrides::default(),
         source: Source::plain(path, text),
+        ..Experiment::default()
     };
     let wires = wires(&experiment, &parts)?;
     experiment.simulation.order = delay::order(&parts, &wires)
@@ -143,13 +135,11 @@ fn simulation(
     let proposed = parts.iter().filter_map(|part| part.description.default_experiment.step);
     let step = overrides.step.or(proposed.reduce(f64::min));
     Ok(Simulation {
-        on_invalid: OnInvalid::default(),
-        ends_with: None,
         start: time("startTime")?.unwrap_or(0.0),
         stop: stop.ok_or_else(|| refuse("has no stop time: give --stop".into()))?,
         step: step.ok_or_else(|| refuse("none of its FMUs proposes a step: give --step".into()))?,
-        coupling: Coupling::Sequential,
         order: parts.iter().map(|part| part.name.to_string()).collect(),
+        ..Simulation::default()
     })
 }
 
