@@ -80,3 +80,21 @@ impl Consistency {
         self.excess.add(&step, &Vector3::repeat(allowed), explained.angle) && is_alive
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Beyond what one difference may be, each further step beyond what is allowed contradicts, and
+    /// only steps below it make up for the excess.
+    #[test]
+    fn an_excess_is_kept() {
+        let step = |x: f64| Vector3::new(0.0, -x, 0.0);
+        let mut excess = Excess::default();
+        let mut add = |x: f64| excess.add(&step(x), &Vector3::repeat(1.0), 0.5);
+        let expected = [(1.4, true), (1.2, false), (1.1, false), (0.9, true), (0.4, true)];
+        for (x, keeps) in expected.into_iter().chain([(1.2, true), (1.5, false)]) {
+            assert_eq!(add(x), keeps, "{x}");
+        }
+    }
+}

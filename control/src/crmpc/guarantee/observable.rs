@@ -58,3 +58,23 @@ impl Observable {
         (by_moment * along).add_scalar(self.lasting + any * by_moment.norm())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::crmpc::guarantee::tighten;
+    use crate::crmpc::settings::{Constraints, Settings};
+    use crate::error_dynamics::Gain;
+    use nalgebra::Vector3;
+
+    /// Without other errors, what the rates may show at rest is little more than Δ̄.
+    #[test]
+    fn oracle_without_errors_only_the_disturbance_is_observed() {
+        let feedback = Gain { k1: -1.5, k2: -4.0 };
+        let exact = Settings { inertia_error: 0.0, feedback, ..Settings::new(Constraints::Robust) };
+        for disturbance_bound in [0.005, 0.02, 0.035] {
+            let (tightening, _) = tighten(&Settings { disturbance_bound, ..exact }).unwrap();
+            let ratio = tightening.observable.largest(&Vector3::zeros()).x / disturbance_bound;
+            assert!((1.0..1.1).contains(&ratio), "{disturbance_bound}: {ratio}");
+        }
+    }
+}
