@@ -219,9 +219,11 @@ fn exceeded(case: &Case) -> [f64; 2] {
 #[test]
 #[ignore = "minutes: for the table of docs/entry.md"]
 fn the_table_of_protection() {
+    use FaultKind::{
+        Accelerometer, Attitude, Clock, Dropout, Frozen, Gyroscope, Late, None, Position, Velocity,
+    };
     let flights = std::env::var("FLIGHTS").map_or(20, |text| text.parse().unwrap());
     let seeds: Vec<u64> = (900..900 + flights).collect();
-    use FaultKind::*;
     for (device, kind, size) in [
         (0, None, 1.0),
         (0, Frozen, 1.0),
