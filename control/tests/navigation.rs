@@ -2,8 +2,9 @@
 //! sensors and winds are drawn.
 
 use crate::harness::navigated::{Case, Figures, fly};
-use control::navigation::{Contradiction, Health, Line, Navigation, Settings};
+use control::navigation::{Contradiction, Health, Line, Memory, Navigation, Settings};
 use nalgebra::Vector3;
+use std::f64::consts::PI;
 use vehicle::fault::{Fault, FaultKind};
 use vehicle::fixes::Fixes;
 use vehicle::noise::uniform;
@@ -318,6 +319,8 @@ fn any_finite_input_leaves_finite_numbers() {
 fn samples_may_be_lost_or_repeated() {
     let navigation = Navigation::new(Settings::default()).unwrap();
     let mut memory = navigation.memory();
+    let is_protected = |memory: &Memory| memory.shown.protection.attitude < PI;
+    assert!(!is_protected(&memory), "before the first sample");
     let mut line = Line { force: Vector3::new(-3.0, 0.0, -9.0), ..Line::default() };
     for (tick, sample) in [(0, 1), (1, 2), (2, 2), (3, 2), (4, 5), (5, 6), (300, 301), (301, 302)] {
         let time = f64::from(tick) * 0.04;
@@ -327,11 +330,13 @@ fn samples_may_be_lost_or_repeated() {
         let shown = &memory.shown;
         assert!(shown.motion.iter().chain(&shown.angles).all(|value| value.is_finite()));
         assert!(shown.deviations.angles.iter().all(|value| *value > 0.0));
+        assert!(tick > 0 || is_protected(&memory));
     }
     // Two of these are between samples 2 and 5, and most of the others before sample 301.
     assert_eq!(memory.missed, 2 + 294);
     navigation.update(&mut memory, 20.0, &line);
     assert_eq!(memory.health, Health::Lost);
+    assert!(!is_protected(&memory));
 }
 
 /// The errors split as orchestrator/experiments/entry/navigated-told.toml tells CRMPC: in a part

@@ -72,6 +72,7 @@ impl Navigation {
         let mut memory = Memory::default();
         memory.shown.angles = initial.angles;
         self.show(&mut memory.shown, (0.0, &state), &Felt::default(), [0.0; 2]);
+        memory.shown.protection = self.unprotected();
         memory
     }
 
@@ -121,6 +122,7 @@ impl Navigation {
             memory.shown = shown;
         } else {
             memory.health = Health::Lost;
+            memory.shown.protection = self.unprotected();
         }
     }
 

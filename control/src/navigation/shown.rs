@@ -193,7 +193,7 @@ impl Navigation {
     ) -> Protection {
         let knows = matches!(health, Health::Aided | Health::Bridging | Health::Degraded);
         if !knows {
-            return Protection { attitude: PI, position: self.settings.planet.radius };
+            return self.unprotected();
         }
         let deviation = angles.z.max(flow[0]).max(flow[1]);
         let hidden = if misalignment > 0.0 { misalignment + deviation } else { 0.0 };
@@ -201,6 +201,11 @@ impl Navigation {
             attitude: (PROTECTED * deviation).max(hidden).min(PI),
             position: PROTECTED * 3_f64.sqrt() * position,
         }
+    }
+
+    /// Returns the bounds where nothing is known.
+    pub(super) fn unprotected(&self) -> Protection {
+        Protection { attitude: PI, position: self.settings.planet.radius }
     }
 
     /// Shows a state at a time (s). Angles are shown as the turns nearest to those before.
