@@ -5,19 +5,7 @@ use crate::{AUTHOR, LICENSE, ModelDescription, Version};
 use quick_xml::escape::escape;
 use std::fmt::Write;
 
-const STYLE: &str = "\
-:root{color-scheme:light dark}
-body{font:16px/1.55 system-ui,sans-serif;max-width:62rem;margin:2.5rem auto;padding:0 1.25rem}
-h1{font-size:1.9rem;margin-bottom:.2rem}h2{margin-top:2.2rem}
-.lead{font-size:1.1rem;margin-top:0}.quiet{opacity:.7;font-size:.9rem}
-.wide,pre{overflow-x:auto}
-table{border-collapse:collapse;width:100%;font-size:.9rem}
-th,td{text-align:left;vertical-align:top;padding:.35rem .7rem .35rem 0;border-bottom:1px solid #8884}
-th{font-weight:600;border-bottom-width:2px}
-td:nth-child(n+2):nth-child(-n+4){font-variant-numeric:tabular-nums}
-code{font:.92em ui-monospace,monospace}
-dl{display:grid;grid-template-columns:max-content 1fr;gap:.2rem 1.2rem}dd{margin:0;overflow-wrap:anywhere}
-";
+const STYLE: &str = include_str!("page.css");
 
 impl ModelDescription {
     /// Returns the page `documentation/index.html`: the FMU's text, then tables of its
