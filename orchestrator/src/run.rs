@@ -161,6 +161,9 @@ impl<'a> Outputs<'a> {
         // A panel of a wrong signal is refused before the run, whether it is drawn or not.
         Panel::resolve_all(system)?;
         let watch = (options.page || !options.no_plot).then(|| Watch::new(system)).transpose()?;
+        for doubt in system.doubts() {
+            tracing::warn!("{doubt}");
+        }
         let stem = system.experiment.source.path.file_stem();
         let name = stem.map_or("run".into(), |stem| stem.to_string_lossy().into_owned());
         let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(&name));

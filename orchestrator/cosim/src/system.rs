@@ -202,6 +202,11 @@ impl System {
         readings.iter().any(|(_, reading)| *reading == Reading::AfterStep)
     }
 
+    /// Returns one warning for each component whose control law is designed for another loop delay.
+    pub fn doubts(&self) -> Vec<String> {
+        delay::warnings(&self.parts(), &self.settings(), &self.loops, self.clock.step())
+    }
+
     /// Returns the full names of the probed variables, in the order of a sample's values, and
     /// whether each responds to the inputs of the communication point.
     pub fn probed(&self) -> Vec<(String, bool)> {

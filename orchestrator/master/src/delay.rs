@@ -9,6 +9,7 @@
 //! is direct is algebraic: no order of calls solves it.
 
 use crate::description::VariableKind;
+use crate::quantity::rounded;
 use crate::settings::{Setting, SettingValue};
 use crate::wiring::{Coupling, Part, Port, Wire};
 use std::collections::BTreeSet;
@@ -34,6 +35,9 @@ pub struct FeedbackLoop {
     /// Components of the loop that do not declare their outputs' dependencies, so that the worst
     /// case was assumed.
     pub undeclared: Vec<usize>,
+    /// Components of the loop that respond to it through states only, so that the returning value
+    /// is never part of the same instant's output.
+    pub stateful: Vec<usize>,
 }
 
 /// Way in which an output depends on an input of its component.
@@ -145,7 +149,7 @@ fn measure(
 ) -> FeedbackLoop {
     let n = components.len();
     let mut ticks = 0;
-    let mut undeclared = Vec::new();
+    let (mut undeclared, mut stateful) = (Vec::new(), Vec::new());
     for (place, &component) in components.iter().enumerate() {
         let (before, after) = (components[(place + n - 1) % n], components[(place + 1) % n]);
         let entering =
@@ -169,8 +173,11 @@ fn measure(
         if passages.contains(&Passage::Undeclared) {
             undeclared.push(component);
         }
+        if passages.iter().all(|passage| *passage == Passage::Delayed) {
+            stateful.push(component);
+        }
     }
-    FeedbackLoop { components: components.to_vec(), ticks, undeclared }
+    FeedbackLoop { components: components.to_vec(), ticks, undeclared, stateful }
 }
 
 /// Finds an order of the components in which sequential coupling has no delay, if there is one: a
@@ -232,6 +239,67 @@ pub fn algebraic_loop(parts: &[Part], wires: &[Wire]) -> Option<Vec<String>> {
         }
         path.push(other);
     }
+}
+
+/// Parameter by which a component states the loop delay that its law is designed for, s.
+const COUNTED_ON: &str = "delay";
+/// Parameter by which a component states how much later than commanded its actuators act, s.
+const TRANSPORT: &str = "actuation.delay";
+
+/// Returns one warning for each component whose control law is designed for another delay than its
+/// feedback loop has. The loop's delay is its ticks times `step` (s), plus the transport delays of
+/// the other components on it. If there are several loops, the one with the longest delay counts;
+/// the warning says so if another one has the delay that the law is designed for. If the component
+/// responds to some of its loops at once, those through its states alone do not count: the values
+/// that they carry, as the moment that actuators achieved, are a record of earlier ticks and not
+/// the measurement that the law acts upon.
+pub fn warnings(
+    parts: &[Part],
+    settings: &[Vec<Setting>],
+    loops: &[FeedbackLoop],
+    step: f64,
+) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for (component, part) in parts.iter().enumerate() {
+        let Some(counted_on) = duration(COUNTED_ON, parts[component], &settings[component]) else {
+            continue;
+        };
+        let mut its_loops: Vec<&FeedbackLoop> =
+            loops.iter().filter(|feedback| feedback.components.contains(&component)).collect();
+        let is_at_once = |feedback: &&FeedbackLoop| !feedback.stateful.contains(&component);
+        if its_loops.iter().any(is_at_once) {
+            its_loops.retain(is_at_once);
+        }
+        let fits =
+            |delay: f64| (delay - counted_on).abs() <= 1e-9 * delay.abs().max(counted_on.abs());
+        let delays = its_loops.into_iter().map(|feedback| {
+            let others = feedback.components.iter().filter(|other| **other != component);
+            let transport: f64 = others
+                .filter_map(|&other| duration(TRANSPORT, parts[other], &settings[other]))
+                .sum();
+            (feedback.ticks as f64 * step + transport, feedback)
+        });
+        let delays: Vec<_> = delays.collect();
+        let longest = delays.iter().max_by(|(a, _), (b, _)| a.total_cmp(b));
+        let Some(&(delay, longest)) = longest.filter(|(delay, _)| !fits(*delay)) else { continue };
+        let unless = if delays.iter().any(|(delay, _)| fits(*delay)) {
+            ", unless its measurements come through another of its loops, which has the delay that is set"
+        } else {
+            ""
+        };
+        let names: Vec<&str> = longest
+            .components
+            .iter()
+            .chain(longest.components.first())
+            .map(|&index| parts[index].name)
+            .collect();
+        let (name, delay) = (part.name, rounded(delay));
+        warnings.push(format!(
+            "{name}.{COUNTED_ON} = {counted_on} s, but the loop {} has a delay of {delay} s: set {name}.{COUNTED_ON} = {delay}{unless}",
+            names.join(" -> ")
+        ));
+    }
+    warnings
 }
 
 /// Returns the value of a real parameter in s, from the experiment or otherwise its start value;

@@ -156,6 +156,31 @@ fn couplings_and_orders_that_delay_the_loop_say_so() {
 }
 
 #[test]
+fn a_law_that_counts_on_another_delay_is_warned_of_in_one_line() {
+    let bench = Bench::new();
+    let warnings = |arguments: &[&str]| {
+        let (code, _, errors) = bench.run(&[&["--quiet"], arguments].concat());
+        assert_eq!(code, 0, "{errors}");
+        errors
+    };
+    let jacobi =
+        ["--coupling", "jacobi", "--set", "gain.delay=1.25", "--set", "plant.actuation.delay=0.25"];
+    let errors = warnings(&jacobi);
+    // The plant also has a parameter of this name, which stays at 0.
+    assert_eq!(errors.lines().count(), 1, "{errors}");
+    let told = "plant.delay = 0 s, but the loop gain -> plant -> gain has a delay of 1 s: set plant.delay = 1";
+    assert!(errors.contains(told), "{errors}");
+    assert_eq!(warnings(&[&jacobi[..], &["--set", "plant.delay=1"]].concat()), "");
+    assert_eq!(warnings(&[]), "");
+    let errors = warnings(&["--set", "gain.delay=0.5"]);
+    assert!(
+        errors
+            .contains("gain.delay = 0.5 s, but the loop gain -> plant -> gain has a delay of 0 s"),
+        "{errors}"
+    );
+}
+
+#[test]
 fn oracle_a_guarantee_is_summed_up_and_told() {
     let section = |prefix: &str| {
         format!(
