@@ -139,3 +139,15 @@ def test_the_keyboard_plays_and_back_undoes(chromium):
     page.go_back()
     after(page, count)
     assert page.evaluate("settings.value('plant.disturbance.kind')") == "white"
+
+
+def test_back_undoes_one_choice_however_quickly_others_follow(chromium):
+    page = opened(chromium)
+    first = page.evaluate("settings.choice.id")
+    page.evaluate("""["lqr", "fbl"].forEach((id) => {
+        document.querySelector("#controller").value = id;
+        document.querySelector("#controller").dispatchEvent(new Event("change"));
+    })""")
+    for expected in ("lqr", first):
+        page.go_back()
+        page.wait_for_function(f"settings.choice.id === '{expected}'")

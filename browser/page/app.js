@@ -311,15 +311,16 @@ function say(text, wrong = false) {
   $("said").classList.toggle("wrong", wrong);
 }
 
-let latest = 0;
+let latest = { what: "", at: 0 };
 
-function changed(names, value, needs = {}) {
+function changed(names, value, needs = {}, what = names.join()) {
   for (const name of names) settings.change(name, value);
   for (const [name, needed] of Object.entries(needs)) settings.change(name, needed);
-  // A change that does not go on with the one before can be undone by going back.
+  // Going back undoes a change, but all of a value that is being dragged or a text that is being written.
   const now = performance.now();
-  history[now - latest > 1000 ? "pushState" : "replaceState"](null, "", `#${settings.address()}`);
-  latest = now;
+  const goesOn = what !== "" && what === latest.what && now - latest.at < 1000;
+  history[goesOn ? "replaceState" : "pushState"](null, "", `#${settings.address()}`);
+  latest = { what, at: now };
   mark();
   fly();
 }

@@ -43,7 +43,7 @@ class OwnLaw {
       this.waiting = setTimeout(() => {
         this.code = $("code").value;
         this.agree();
-        changed([], null);
+        changed([], null, {}, "law");
       }, 400);
     };
     $("agree").onclick = () => { this.agree(); fly(); };
