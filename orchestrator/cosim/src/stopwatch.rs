@@ -75,7 +75,7 @@ impl Instance for Stopwatch {
 
     forward! {
         inside:
-        enter_initialization, exit_initialization, terminate, reset, save, restore, directional_derivative,
+        enter_initialization, exit_initialization, terminate, reset, save, restore,
     }
 
     fn do_step(&mut self, time: f64, step: f64) -> Outcome {

@@ -123,6 +123,6 @@ impl Instance for Watched {
 
     forward! {
         inside:
-        set_real, set_integer, set_boolean, set_string, enter_initialization, exit_initialization, do_step, terminate, reset, save, restore, directional_derivative,
+        set_real, set_integer, set_boolean, set_string, enter_initialization, exit_initialization, do_step, terminate, reset, save, restore,
     }
 }

@@ -115,17 +115,6 @@ pub(crate) type StateHandle = *mut c_void;
 pub(crate) type StateInPlace = unsafe extern "C" fn(Handle, *mut StateHandle) -> c_int;
 /// Type of the function fmi2SetFMUstate.
 pub(crate) type SetState = unsafe extern "C" fn(Handle, StateHandle) -> c_int;
-/// Type of the function fmi2GetDirectionalDerivative. The arguments are the unknown and the known
-/// variables with their numbers, the seed of the known ones, and what it adds to the unknown ones.
-pub(crate) type DirectionalDerivative = unsafe extern "C" fn(
-    Handle,
-    *const c_uint,
-    usize,
-    *const c_uint,
-    usize,
-    *const f64,
-    *mut f64,
-) -> c_int;
 
 #[cfg(test)]
 mod tests {

@@ -196,30 +196,4 @@ impl Instance for FmuInstance {
     fn restore(&mut self, number: usize) -> Outcome {
         self.go_back(number)
     }
-
-    fn directional_derivative(
-        &mut self,
-        unknown: &[u32],
-        known: &[u32],
-        seed: &[f64],
-        added: &mut [f64],
-    ) -> Outcome {
-        assert_eq!((known.len(), unknown.len()), (seed.len(), added.len()), "one value for each");
-        let Some(function) = self.functions().directional_derivative else {
-            let call = "getDirectionalDerivative";
-            return Err(CallFailure::new(call, "its library computes no derivatives"));
-        };
-        // SAFETY: the instance is alive, and all arrays have the lengths that are passed.
-        self.call("getDirectionalDerivative", |_, handle| unsafe {
-            function(
-                handle,
-                unknown.as_ptr(),
-                unknown.len(),
-                known.as_ptr(),
-                known.len(),
-                seed.as_ptr(),
-                added.as_mut_ptr(),
-            )
-        })
-    }
 }

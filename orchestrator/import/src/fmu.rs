@@ -80,15 +80,9 @@ impl Fmu {
     /// Returns an error if the FMU lacks a variable that a law needs.
     pub fn flown_by_law(self: &Rc<Self>) -> Result<Self, Error> {
         let path = self.path.clone();
-        let mut description = self.description.clone();
+        let description = self.description.clone();
         let ports = Ports::find(&description)
             .map_err(|message| Error::Fmu { path: path.clone(), message })?;
-        // Derivatives would be those of the FMU's own law.
-        if let Some(interface) = &mut description.co_simulation {
-            interface
-                .capabilities
-                .retain(|name| !name.starts_with("providesDirectionalDerivative"));
-        }
         Ok(Self { path, description, content: Content::Law(Rc::clone(self), ports) })
     }
 

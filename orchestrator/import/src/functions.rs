@@ -38,7 +38,6 @@ pub(crate) use functions;
 pub(crate) struct Functions {
     pub(crate) own: OwnFunctions,
     /// Optional, because FMI asks for it only if the description declares it.
-    pub(crate) directional_derivative: Option<fmi::DirectionalDerivative>,
     pub(crate) interface: InterfaceFunctions,
     common: Common,
 }
@@ -300,7 +299,6 @@ impl Functions {
             };
             Ok(Self {
                 own: OwnFunctions::load(&symbols)?,
-                directional_derivative: symbols.get("GetDirectionalDerivative").ok(),
                 interface,
                 common: Common::load(symbols, exchanges)?,
             })

@@ -119,21 +119,6 @@ pub trait Instance {
     fn restore(&mut self, _number: usize) -> Outcome {
         Err(CallFailure::new("setFMUstate", "the instance keeps no states"))
     }
-    /// Computes what a change `seed` of the `known` variables adds to the `unknown` ones, by their
-    /// partial derivatives.
-    ///
-    /// # Errors
-    /// Returns an error if the instance reports a failure or has no such function.
-    fn directional_derivative(
-        &mut self,
-        _unknown: &[u32],
-        _known: &[u32],
-        _seed: &[f64],
-        _added: &mut [f64],
-    ) -> Outcome {
-        let call = "getDirectionalDerivative";
-        Err(CallFailure::new(call, "the instance computes no derivatives"))
-    }
 }
 
 /// Makes calls of [`Instance`] those of another instance, which the method `through` hands to a
@@ -175,11 +160,6 @@ macro_rules! forward {
     };
     (@signature $through:ident restore) => {
         $crate::forward!(@call $through restore(number: usize));
-    };
-    (@signature $through:ident directional_derivative) => {
-        $crate::forward!(@call $through directional_derivative(
-            unknown: &[u32], known: &[u32], seed: &[f64], added: &mut [f64]
-        ));
     };
     // All others have no arguments.
     (@signature $through:ident $call:ident) => { $crate::forward!(@call $through $call()); };

@@ -84,17 +84,6 @@ impl<M: ContinuousModel> System for Equations<'_, M> {
     }
 
     fn jacobian(&mut self, at: &Point, jacobian: &mut DMatrix<f64>) -> Result<(), Refusal> {
-        let Layout { states, derivatives, .. } = self.layout;
-        if self.layout.has_directional_derivatives {
-            self.place(at.time, &at.states)?;
-            for (known, mut column) in states.iter().zip(jacobian.column_iter_mut()) {
-                let added = column.as_mut_slice();
-                self.model
-                    .directional_derivative(derivatives, &[*known], &[1.0], added)
-                    .map_err(Refusal::Failed)?;
-            }
-            return Ok(());
-        }
         let mut changed = at.states.clone();
         for (place, mut column) in jacobian.column_iter_mut().enumerate() {
             let state = at.states[place];

@@ -268,7 +268,7 @@ fn finite(call: &'static str, kind: &str, names: &[String], values: &[f64], time
 }
 
 impl<M: ContinuousModel> Instance for Exchange<M> {
-    forward! { through: get_real, get_integer, get_boolean, terminate, directional_derivative }
+    forward! { through: get_real, get_integer, get_boolean, terminate }
 
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
         let set = |model: &mut M| model.set_real(references, values);

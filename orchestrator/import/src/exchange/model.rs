@@ -42,7 +42,6 @@ pub(crate) struct Layout {
     pub(super) derivatives: Vec<u32>,
     /// Number of event indicators.
     pub(super) indicators: usize,
-    pub(super) has_directional_derivatives: bool,
     pub(super) needs_completed_step: bool,
     /// Relative tolerance of the integration.
     pub(super) tolerance: f64,
@@ -62,7 +61,6 @@ impl Layout {
         };
         let mut layout = Self {
             indicators: description.event_indicators,
-            has_directional_derivatives: interface.has("providesDirectionalDerivative"),
             needs_completed_step,
             tolerance,
             ..Self::default()

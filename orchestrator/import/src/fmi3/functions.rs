@@ -71,19 +71,6 @@ pub(super) type DoStep = unsafe extern "C" fn(
     *mut Truth,
     *mut f64,
 ) -> c_int;
-/// Type of the function fmi3GetDirectionalDerivative. The arguments are the unknown and the known
-/// variables, the seed and the result, each with the number of its elements.
-pub(super) type DirectionalDerivative = unsafe extern "C" fn(
-    Handle,
-    *const u32,
-    usize,
-    *const u32,
-    usize,
-    *const f64,
-    usize,
-    *mut f64,
-    usize,
-) -> c_int;
 
 /// The functions of FMI 3.0 that this program calls.
 pub(crate) struct Functions {
@@ -91,7 +78,6 @@ pub(crate) struct Functions {
     update_discrete_states: UpdateDiscreteStates,
     pub(super) get: [Option<Access>; ACCESS.len()],
     pub(super) set: [Option<Access>; ACCESS.len()],
-    pub(super) directional_derivative: Option<DirectionalDerivative>,
     pub(super) interface: InterfaceFunctions,
     common: Common,
 }
@@ -159,7 +145,6 @@ impl Functions {
                 update_discrete_states: symbols.get("UpdateDiscreteStates")?,
                 get: ACCESS.map(|[(name, _), _]| symbols.get(name).ok()),
                 set: ACCESS.map(|[_, (name, _)]| symbols.get(name).ok()),
-                directional_derivative: symbols.get("GetDirectionalDerivative").ok(),
                 interface,
                 common: Common::load(symbols, exchanges)?,
             })

@@ -147,7 +147,7 @@ fn tolerance(time: f64, step: f64) -> f64 {
 }
 
 impl Instance for StepInstance {
-    forward! { through: get_real, get_integer, get_boolean, terminate, directional_derivative }
+    forward! { through: get_real, get_integer, get_boolean, terminate }
     forward! { set: set_real, set_integer, set_boolean, set_string }
 
     fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {

@@ -3,7 +3,7 @@
 #![allow(unsafe_code)]
 
 use super::functions::{Functions, InterfaceFunctions, call};
-use super::layout::{Arrays, Layout};
+use super::layout::Layout;
 use super::values::Lists;
 use crate::exchange::ContinuousModel;
 use crate::fmi::Text;
@@ -162,46 +162,5 @@ impl Instance for Fmi3Unit {
 
     fn restore(&mut self, number: usize) -> Outcome {
         self.calls.go_back(number)
-    }
-
-    fn directional_derivative(
-        &mut self,
-        unknown: &[u32],
-        known: &[u32],
-        seed: &[f64],
-        added: &mut [f64],
-    ) -> Outcome {
-        let call = "getDirectionalDerivative";
-        assert_eq!((known.len(), unknown.len()), (seed.len(), added.len()), "one value for each");
-        let Some(function) = self.calls.functions().directional_derivative else {
-            return Err(CallFailure::new(call, "its library computes no derivatives"));
-        };
-        let arrays = |variables: &[u32]| -> Arrays {
-            variables.iter().map(|variable| self.layout.place(*variable)).collect()
-        };
-        let (unknowns, knowns) = (arrays(unknown), arrays(known));
-        let mut seeds = vec![0.0; knowns.count];
-        for (place, seed) in knowns.elements.iter().zip(seed) {
-            seeds[*place] += seed;
-        }
-        let mut all = vec![0.0; unknowns.count];
-        // SAFETY: the instance is alive, and all arrays have the lengths that are passed.
-        self.calls.call(call, |_, handle| unsafe {
-            function(
-                handle,
-                unknowns.references.as_ptr(),
-                unknowns.references.len(),
-                knowns.references.as_ptr(),
-                knowns.references.len(),
-                seeds.as_ptr(),
-                seeds.len(),
-                all.as_mut_ptr(),
-                all.len(),
-            )
-        })?;
-        for (added, place) in added.iter_mut().zip(&unknowns.elements) {
-            *added = all[*place];
-        }
-        Ok(())
     }
 }
