@@ -2,7 +2,6 @@
 
 use crate::parameters::Parameters;
 use crate::plant::{ATTITUDE, Output, ReentryPlant};
-use crate::roles::{Unknown, role};
 use crate::table;
 use fmi_export::{Context, Description, EventInfo, Failure, Inputs, LastEvent, Model, Restoration};
 use vehicle::Vehicle;
@@ -188,23 +187,5 @@ impl Model for ReentryPlant {
             states_changed: plant.deflections != before,
             terminates: plant.margins().is_some_and(|margins| margins.iter().any(|m| *m <= 0.0)),
         })
-    }
-
-    fn partial_derivative(
-        &mut self,
-        time: f64,
-        unknown: &str,
-        known: &str,
-    ) -> Result<Option<f64>, Failure> {
-        self.check(&self.ready()?.state, time)?;
-        let (Some(role), Some(by)) = (role(unknown).as_unknown, role(known).as_known) else {
-            let text = "derivatives exist only of outputs with respect to states and inputs";
-            return Err(Failure::Error(format!("'{unknown}' by '{known}': {text}")));
-        };
-        let is_curved = self.ready()?.has_surface_tables();
-        if is_curved || self.parameters.entry.is_entry() || role == Unknown::Flight {
-            return self.difference(time, unknown, by).map(Some);
-        }
-        self.given_derivative(time, role, by).map(Some)
     }
 }

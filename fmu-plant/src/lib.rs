@@ -2,13 +2,11 @@
 //! a variable table.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
-mod derivatives;
 mod entry;
 mod instance;
 mod own_vehicle;
 mod parameters;
 mod plant;
-mod roles;
 mod sensing;
 mod table;
 #[cfg(test)]

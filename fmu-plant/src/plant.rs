@@ -16,8 +16,6 @@ use vehicle::sensors::Sample;
 /// Number of states that describe attitude and rates. The deflections follow after them, and then
 /// the motion of the centre of mass.
 pub(crate) const ATTITUDE: usize = 6;
-/// Index of the first state of the motion.
-pub(crate) const MOTION: usize = ATTITUDE + SURFACES;
 /// Number of event indicators: one for each deflection, and altitude and speed above the end of an
 /// entry flight.
 pub(crate) const INDICATORS: usize = SURFACES + 2;

@@ -185,11 +185,6 @@ impl Actuators {
         }
     }
 
-    /// Whether some surfaces have tables, so that their moments are not linear in the deflections.
-    pub fn has_tables(&self) -> bool {
-        !self.tables.is_empty()
-    }
-
     /// Control moment (N m) of the surfaces and jets.
     pub fn moment(
         &self,
@@ -209,24 +204,6 @@ impl Actuators {
             return moment;
         }
         moment + moment_of_tables(&self.tables, &flow, deflections) * self.scale
-    }
-
-    /// Partial derivative of [`Actuators::moment`] with respect to the deflections, N m/rad,
-    /// without tables.
-    pub fn moment_by_deflections(&self) -> &SMatrix<f64, 3, SURFACES> {
-        &self.surface_moments
-    }
-
-    /// Partial derivative of the moment (N m) with respect to the jet commands at the instant at
-    /// which they are taken.
-    pub fn moment_by_jets(&self, command: &Command) -> SMatrix<f64, 3, JETS> {
-        let mut derivative = self.jet_moments;
-        for (j, mut column) in derivative.column_iter_mut().enumerate() {
-            if self.jet_mode == JetMode::OnOff || !(0.0..=1.0).contains(&command.jets[j]) {
-                column.fill(0.0);
-            }
-        }
-        derivative
     }
 }
 

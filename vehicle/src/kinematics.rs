@@ -169,22 +169,6 @@ impl Kinematics {
             Self::Exact => Self::with_alpha_rate(matrix, sines[1].0),
         }
     }
-
-    /// Partial derivative ∂/∂β of [`Kinematics::turn`].
-    pub fn turn_beta(self, angles: &Vector3<f64>) -> Matrix3<f64> {
-        let sines = sines(angles);
-        let [_, (sb, cb), (ss, cs)] = sines;
-        let slope = Matrix3::new(0.0, -cs * sb, ss * sb, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0) / (cb * cb);
-        self.complete(slope, &turn(&sines), sb, cb)
-    }
-
-    /// Partial derivative ∂/∂σ of [`Kinematics::turn`].
-    pub fn turn_sigma(self, angles: &Vector3<f64>) -> Matrix3<f64> {
-        let (sb, cb) = sin_cos(angles.y);
-        let (ss, cs) = sin_cos(angles.z);
-        let slope = Matrix3::new(0.0, ss / cb, cs / cb, 0.0, cs, -ss, 0.0, 0.0, 0.0);
-        self.complete(slope, &Matrix3::zeros(), sb, 0.0)
-    }
 }
 
 /// Terms of the trajectory in Wu 2015 (1), without those of α̇ sin β.

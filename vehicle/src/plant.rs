@@ -3,7 +3,7 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `equations` | the equations of motion and their partial derivatives |
+//! | `equations` | the equations of motion |
 //! | `config`, `making` | the configuration of a plant, and the plant that is made from it |
 //! | `flight` | an entry flight |
 //! | `loads` | the inputs, and the moments and derivatives that follow from them |
@@ -37,7 +37,7 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::state::{BETA_LIMIT, State, angles, rates, state};
 pub use config::Config;
-pub use equations::{Load, Partials, check, derivative, partial_derivatives};
+pub use equations::{Load, check, derivative};
 pub use flight::Entering;
 pub use holding::Held;
 pub use loads::Input;

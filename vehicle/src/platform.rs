@@ -9,8 +9,8 @@ use crate::axes::LEVEL;
 use crate::error::{Error, finite, not_negative};
 use crate::kinematics::{Kinematics, Sines, sines};
 use crate::math::sin_cos;
-use crate::trajectory::{TRAJECTORY, Trajectory};
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use crate::trajectory::Trajectory;
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use settings::Declared;
 
@@ -95,66 +95,11 @@ impl Pose {
             let velocity = body_from_velocity.column(0);
             rate += velocity * (self.alpha_rate * velocity.y);
         }
-        let [force, field] = self.fields(&body_from_velocity, surroundings);
-        [rate, force, field]
-    }
-
-    /// Specific force (m/s²) and magnetic field (T) in body axes.
-    fn fields(
-        &self,
-        body_from_velocity: &Matrix3<f64>,
-        surroundings: &Surroundings,
-    ) -> [Vector3<f64>; 2] {
         let body_from_level = body_from_velocity * velocity_from_level(&self.trajectory);
         let force = match &self.specific_force {
             Some(force) => body_from_velocity * force,
             None => body_from_level * Vector3::new(0.0, 0.0, -surroundings.gravity),
         };
-        [force, body_from_level * surroundings.field]
-    }
-
-    /// Partial derivatives of [`Pose::felt`] with respect to the state (9 × 6) and the trajectory
-    /// (9 × 7), given those of α̇.
-    pub fn felt_by_state_and_trajectory(
-        &self,
-        surroundings: &Surroundings,
-        alpha_rate_by_state: &SMatrix<f64, 1, 6>,
-        alpha_rate_by_trajectory: &SMatrix<f64, 1, TRAJECTORY>,
-    ) -> (SMatrix<f64, 9, 6>, SMatrix<f64, 9, TRAJECTORY>) {
-        let mut by_state = SMatrix::<f64, 9, 6>::zeros();
-        let mut by_trajectory = SMatrix::<f64, 9, TRAJECTORY>::zeros();
-        by_state.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
-        let body_from_velocity = body_from_velocity(&self.angles);
-        if self.kinematics == Kinematics::Printed {
-            let axis = -body_from_velocity.column(0);
-            let (sa, ca) = sin_cos(self.angles.x);
-            let (sb, cb) = sin_cos(self.angles.y);
-            let mut rate = by_state.fixed_rows_mut::<3>(0);
-            rate -= axis * alpha_rate_by_state * sb;
-            let mut alpha = rate.column_mut(0);
-            alpha -= Vector3::new(sa * cb, 0.0, -ca * cb) * (self.alpha_rate * sb);
-            let mut beta = rate.column_mut(1);
-            beta -= (Vector3::new(ca * sb, -cb, sa * sb) * sb + axis * cb) * self.alpha_rate;
-            by_trajectory
-                .fixed_rows_mut::<3>(0)
-                .copy_from(&(axis * alpha_rate_by_trajectory * -sb));
-        }
-        // A field that is fixed in space turns against the body: v̇ = −ω × v.
-        let by_angles = Kinematics::Exact.r_inverse(&self.angles);
-        let (sg, cg) = sin_cos(self.trajectory.flight_path_angle);
-        let by_course =
-            [Vector3::y(), Vector3::new(-sg, 0.0, cg)].map(|axis| body_from_velocity * axis);
-        let fields = self.fields(&body_from_velocity, surroundings);
-        for (row, field) in [3, 6].into_iter().zip(fields) {
-            for i in 0..3 {
-                by_state
-                    .fixed_view_mut::<3, 1>(row, i)
-                    .copy_from(&field.cross(&by_angles.column(i)));
-            }
-            for (i, axis) in by_course.iter().enumerate() {
-                by_trajectory.fixed_view_mut::<3, 1>(row, i).copy_from(&field.cross(axis));
-            }
-        }
-        (by_state, by_trajectory)
+        [rate, force, body_from_level * surroundings.field]
     }
 }

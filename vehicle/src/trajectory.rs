@@ -1,7 +1,7 @@
 //! Trajectory of the vehicle: the direction of flight, and how it turns, as in Wu 2015 (1).
 
 use crate::math::sin_cos;
-use nalgebra::{SMatrix, Vector3};
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::Declared;
 
@@ -39,12 +39,9 @@ pub struct Trajectory {
     pub latitude_rate: f64,
 }
 
-/// Number of the trajectory's angles and rates.
-pub const TRAJECTORY: usize = 7;
-
 impl Trajectory {
     /// Returns all values in the order of the fields.
-    pub fn values(&self) -> [f64; TRAJECTORY] {
+    pub fn values(&self) -> [f64; 7] {
         [
             self.flight_path_angle,
             self.heading,
@@ -85,35 +82,5 @@ impl Trajectory {
             climb - north * cp - around * cl * sp,
             turn * cg - north * sp * sg + around * (cl * cp * sg - sl * cg),
         )
-    }
-
-    /// Partial derivatives of [`Trajectory::turn_rate`] with respect to the fields, in their order.
-    pub fn turn_rate_by_fields(&self, earth_rate: f64) -> SMatrix<f64, 3, TRAJECTORY> {
-        let around = self.longitude_rate + earth_rate;
-        let (turn, north) = (self.heading_rate, self.latitude_rate);
-        let (sg, cg) = sin_cos(self.flight_path_angle);
-        let (sp, cp) = sin_cos(self.heading);
-        let (sl, cl) = sin_cos(self.latitude);
-        SMatrix::from_columns(&[
-            Vector3::new(
-                -turn * cg + north * sp * sg + around * (sl * cg - cl * cp * sg),
-                0.0,
-                -turn * sg - north * sp * cg + around * (cl * cp * cg + sl * sg),
-            ),
-            Vector3::new(
-                -north * cp * cg - around * cl * sp * cg,
-                north * sp - around * cl * cp,
-                -north * cp * sg - around * cl * sp * sg,
-            ),
-            Vector3::new(
-                around * (cl * sg - sl * cp * cg),
-                around * sl * sp,
-                -around * (sl * cp * sg + cl * cg),
-            ),
-            Vector3::y(),
-            Vector3::new(-sg, 0.0, cg),
-            Vector3::new(cl * cp * cg + sl * sg, -cl * sp, cl * cp * sg - sl * cg),
-            Vector3::new(-sp * cg, -cp, -sp * sg),
-        ])
     }
 }

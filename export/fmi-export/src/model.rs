@@ -204,19 +204,4 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
     /// Copies the event indicators for model exchange as of the last [`Model::calculate`], which
     /// the shell calls before if something changed.
     fn event_indicators(&self, _indicators: &mut [f64]) {}
-
-    /// Returns the partial derivative of the variable named `unknown` with respect to the input or
-    /// state named `known`, at the current `time`, state and inputs, or `None` if the shell is to
-    /// take a difference of fourth order. It is called only if the FMU has continuous states.
-    ///
-    /// # Errors
-    /// Says why there is no derivative.
-    fn partial_derivative(
-        &mut self,
-        _time: f64,
-        _unknown: &str,
-        _known: &str,
-    ) -> Result<Option<f64>, Failure> {
-        Ok(None)
-    }
 }

@@ -45,12 +45,6 @@ pub(crate) trait ModelInstance: Send {
     fn set_continuous_states(&mut self, states: &[f64]);
     fn new_discrete_states(&mut self, time: f64) -> Result<EventInfo, Failure>;
     fn event_indicators(&self, indicators: &mut [f64]);
-    fn partial_derivative(
-        &mut self,
-        time: f64,
-        unknown: usize,
-        known: usize,
-    ) -> Result<Option<f64>, Failure>;
 }
 
 struct Bound<M> {
@@ -271,16 +265,6 @@ impl<M: Model> ModelInstance for Bound<M> {
 
     fn event_indicators(&self, indicators: &mut [f64]) {
         self.model.event_indicators(indicators);
-    }
-
-    fn partial_derivative(
-        &mut self,
-        time: f64,
-        unknown: usize,
-        known: usize,
-    ) -> Result<Option<f64>, Failure> {
-        let name = |reference: usize| self.table.entries[reference].variable.name.as_str();
-        self.model.partial_derivative(time, name(unknown), name(known))
     }
 }
 

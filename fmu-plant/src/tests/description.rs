@@ -1,42 +1,9 @@
 //! The description of the FMU, and the places of its variables.
 
 use crate::plant::ReentryPlant;
-use crate::roles::{Known, Role, Unknown, role};
 use fmi_export::describe;
 use model_description::variable::{Causality, Variability, VariableKind};
 use vehicle::Scenario;
-
-#[test]
-fn roles_and_names_agree() {
-    let description = describe::<ReentryPlant>();
-    for (name, expected) in [
-        ("attitude.alpha", Role::state(0)),
-        ("rate.r", Role::state(5)),
-        ("deflection[1]", Role::state(6)),
-        ("deflection[8]", Role::state(13)),
-        ("moment.y", Known::Moment(1).into()),
-        ("disturbanceMoment.y", Known::DisturbanceMoment(1).into()),
-        ("surface[1]", Known::Surface(0).into()),
-        ("surface[8]", Known::Surface(7).into()),
-        ("jet[1]", Known::Jet(0).into()),
-        ("jet[10]", Known::Jet(9).into()),
-        ("deflectionRate[8]", Unknown::Derivative(13).into()),
-        ("trajectory.flightPathAngle", Known::Trajectory(0).into()),
-        ("trajectory.latitudeRate", Known::Trajectory(6).into()),
-        ("measured.gyroscope.x", Unknown::Measured(0).into()),
-        ("measured.accelerometer.y", Unknown::Measured(4).into()),
-        ("measured.magnetometer.z", Unknown::Measured(8).into()),
-        ("measured.time", Unknown::Held.into()),
-        ("star.attitude.z", Unknown::Held.into()),
-        ("flight.dynamicPressure", Unknown::Flight.into()),
-        ("flow.alpha", Unknown::Flight.into()),
-        ("measured.sample", Role::default()),
-        ("inertia.ratio.Ixx", Role::default()),
-    ] {
-        description.position(name).unwrap();
-        assert_eq!(role(name), expected, "{name}");
-    }
-}
 
 #[test]
 fn the_description_holds() {

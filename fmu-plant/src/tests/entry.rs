@@ -178,24 +178,3 @@ fn a_flight_that_becomes_vertical_is_an_error_that_says_so() {
     let refused = instance.calculate(0.0, LastEvent::InputSet).unwrap_err();
     assert!(matches!(&refused, Failure::Discard(text) if text.contains("vertical")), "{refused:?}");
 }
-
-/// At the edge of its duty cycle a jet has the derivative that it has at a fixed flight condition.
-#[test]
-fn oracle_a_jet_that_is_off_has_the_derivative_of_a_fixed_flight_condition() {
-    let set = |translation| {
-        started(|instance| {
-            entering(instance);
-            instance.command.jets.fill(0.0);
-            instance.parameters.entry.translation = translation;
-        })
-    };
-    let (mut entry, mut fixed) = (set(Translation::Entry), set(Translation::Given));
-    for unknown in ["angularAcceleration.p", "angularAcceleration.r", "appliedMoment.z"] {
-        let [during, without] = [&mut entry, &mut fixed]
-            .map(|instance| instance.partial_derivative(0.0, unknown, "jet[1]").unwrap().unwrap());
-        assert!(
-            without != 0.0 && (during - without).abs() < 1e-6 * without.abs(),
-            "{during} {without}"
-        );
-    }
-}

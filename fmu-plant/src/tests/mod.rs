@@ -1,7 +1,7 @@
 //! Tests of the instance through the interface that the shell uses.
 
 mod actuators;
-mod derivatives;
+mod dependencies;
 mod description;
 mod entry;
 mod model_exchange;

@@ -1,11 +1,11 @@
 //! Equations of motion: Θ̇ = R ω, plus the effect of a turning trajectory, and
-//! ω̇ = I⁻¹(m − ω × I ω) + R⁻¹ Δ, with their partial derivatives.
+//! ω̇ = I⁻¹(m − ω × I ω) + R⁻¹ Δ.
 
 use crate::dynamics::RigidBody;
 use crate::error::Error;
 use crate::kinematics::{Kinematics, Sines, sines};
 use crate::state::{BETA_LIMIT, State, angles, rates, state};
-use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 /// Loads at one instant, which the right side needs besides the state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,50 +51,6 @@ pub(super) fn angle_rates(
         return angle_rates;
     }
     angle_rates + kinematics.turn_at(sines) * turn_rate
-}
-
-/// Partial derivatives of the state derivative [`derivative`].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Partials {
-    /// Derivative with respect to the state (6 × 6).
-    pub by_state: Matrix6<f64>,
-    /// Derivative with respect to the moment (6 × 3).
-    pub by_moment: Matrix6x3<f64>,
-    /// Derivative with respect to the trajectory's turn rate (6 × 3).
-    pub by_turn_rate: Matrix6x3<f64>,
-}
-
-/// Returns the partial derivatives of [`derivative`].
-pub fn partial_derivatives(
-    body: &RigidBody,
-    kinematics: Kinematics,
-    state: &State,
-    load: &Load,
-) -> Partials {
-    let (angles, rates) = (angles(state), rates(state));
-    let (r, r_inverse) = (kinematics.r(&angles), kinematics.r_inverse(&angles));
-    let (r_alpha, r_beta) = (kinematics.r_alpha(&angles), kinematics.r_beta(&angles));
-    let gyroscopic: Matrix3<f64> =
-        (body.inertia * rates).cross_matrix() - rates.cross_matrix() * body.inertia;
-    let turned_by_beta = kinematics.turn_beta(&angles) * load.turn_rate;
-    let turned_by_sigma = kinematics.turn_sigma(&angles) * load.turn_rate;
-    let delta = r_inverse * load.delta;
-
-    let mut by_state = Matrix6::zeros();
-    by_state.fixed_view_mut::<3, 1>(0, 0).copy_from(&(r_alpha * rates));
-    by_state.fixed_view_mut::<3, 1>(0, 1).copy_from(&(r_beta * rates + turned_by_beta));
-    by_state.fixed_view_mut::<3, 1>(0, 2).copy_from(&turned_by_sigma);
-    by_state.fixed_view_mut::<3, 3>(0, 3).copy_from(&r);
-    // ∂R⁻¹ = −R⁻¹ ∂R R⁻¹
-    by_state.fixed_view_mut::<3, 1>(3, 0).copy_from(&-(r_inverse * (r_alpha * delta)));
-    by_state.fixed_view_mut::<3, 1>(3, 1).copy_from(&-(r_inverse * (r_beta * delta)));
-    by_state.fixed_view_mut::<3, 3>(3, 3).copy_from(&(body.inverse * gyroscopic));
-
-    let mut by_moment = Matrix6x3::zeros();
-    by_moment.fixed_view_mut::<3, 3>(3, 0).copy_from(&body.inverse);
-    let mut by_turn_rate = Matrix6x3::zeros();
-    by_turn_rate.fixed_view_mut::<3, 3>(0, 0).copy_from(&kinematics.turn(&angles));
-    Partials { by_state, by_moment, by_turn_rate }
 }
 
 /// Checks that the equations hold at a state.

@@ -1,14 +1,14 @@
 //! Inputs of the plant, and the moments and derivatives that follow from them.
 
-use super::equations::{self, Load, Partials};
+use super::equations::{self, Load};
 use super::{Entering, Held, Plant};
-use crate::actuators::{Actuators, Command, Conditions, Drive};
+use crate::actuators::{Conditions, Drive};
 use crate::axes::AXES;
-use crate::effectors::{JETS, SURFACES, Surfaces};
+use crate::effectors::Surfaces;
 use crate::entry::Prescribed;
 use crate::state::State;
-use crate::trajectory::{TRAJECTORY, Trajectory};
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use crate::trajectory::Trajectory;
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::Declared;
 
@@ -69,11 +69,6 @@ impl Plant {
         input.disturbance_moment + disturbance_moment
     }
 
-    /// Whether the moment of some surfaces is not linear in the deflections.
-    pub fn has_surface_tables(&self) -> bool {
-        self.actuators.as_ref().is_some_and(Actuators::has_tables)
-    }
-
     /// Control moment (N m) at the time `elapsed` (s) after the present one, provided that the
     /// drive does not change until then.
     #[inline]
@@ -118,26 +113,6 @@ impl Plant {
         self.actuators
             .as_ref()
             .map_or_else(Surfaces::zeros, |actuators| actuators.rates(&held.drive))
-    }
-
-    /// Partial derivatives of [`Plant::applied_moment`] with respect to the input moment (3 × 3)
-    /// and the deflections (3 × 8).
-    pub fn applied_moment_by_moment_and_deflections(
-        &self,
-    ) -> (Matrix3<f64>, SMatrix<f64, 3, SURFACES>) {
-        let held = self.transport.is_some() || self.moment_resolution > 0.0;
-        let at_once = if held { Matrix3::zeros() } else { Matrix3::identity() };
-        self.actuators.as_ref().map_or((at_once, SMatrix::zeros()), |actuators| {
-            (Matrix3::zeros(), *actuators.moment_by_deflections())
-        })
-    }
-
-    /// Partial derivative of the applied moment with respect to the jet commands at the instant at
-    /// which they are taken (3 × 10).
-    pub fn applied_moment_by_jets(&self, command: &Command) -> SMatrix<f64, 3, JETS> {
-        self.actuators
-            .as_ref()
-            .map_or_else(SMatrix::zeros, |actuators| actuators.moment_by_jets(command))
     }
 
     /// Trajectory: that of the entry flight, or the input. Also its turn rate (rad/s).
@@ -187,19 +162,5 @@ impl Plant {
         }
         let load = self.load((time, 0.0), self.state[0], input, held);
         equations::derivative(&self.body, self.kinematics, &self.state, &load)
-    }
-
-    /// Partial derivatives of [`Plant::derivative`] without an entry flight, and those of the turn
-    /// rate with respect to the trajectory (3 × 7).
-    pub fn partial_derivatives(
-        &self,
-        time: f64,
-        input: &Input,
-        held: &Held,
-    ) -> (Partials, SMatrix<f64, 3, TRAJECTORY>) {
-        let load = self.load((time, 0.0), self.state[0], input, held);
-        let partials =
-            equations::partial_derivatives(&self.body, self.kinematics, &self.state, &load);
-        (partials, input.trajectory.turn_rate_by_fields(self.earth_rate))
     }
 }

@@ -2,14 +2,12 @@
 //! output.
 
 use super::equations::angle_rates;
-use super::{Entering, Held, Input, Plant};
+use super::{Entering, Input, Plant};
 use crate::fixes::Fixes;
 use crate::frames::Place;
 use crate::kinematics::sines;
 use crate::platform::{Pose, Readings};
 use crate::sensors::{Felt, Sample, Sensors};
-use crate::trajectory::TRAJECTORY;
-use nalgebra::SMatrix;
 
 impl Plant {
     /// Takes the sample that is due at `time` (s), if there is one.
@@ -87,24 +85,5 @@ impl Plant {
     ) -> Sample {
         let ideal = || self.measured(entering, time, input);
         self.sensors.as_ref().map_or_else(ideal, Sensors::arrived)
-    }
-
-    /// Partial derivatives of the readings of [`Plant::measured`] without an entry flight, with
-    /// respect to the state (9 × 6) and the trajectory (9 × 7). They are zero for sampled sensors,
-    /// whose samples depend on either only at the instant of sampling.
-    pub fn measured_by_state_and_trajectory(
-        &self,
-        time: f64,
-        input: &Input,
-        held: &Held,
-    ) -> (SMatrix<f64, 9, 6>, SMatrix<f64, 9, TRAJECTORY>) {
-        if self.sensors.is_some() {
-            return (SMatrix::zeros(), SMatrix::zeros());
-        }
-        let (partials, turn_rate_by_trajectory) = self.partial_derivatives(time, input, held);
-        let by_state = partials.by_state.fixed_rows::<1>(0).into_owned();
-        let by_trajectory = partials.by_turn_rate.fixed_rows::<1>(0) * turn_rate_by_trajectory;
-        let pose = self.pose(None, input);
-        pose.felt_by_state_and_trajectory(&self.surroundings, &by_state, &by_trajectory)
     }
 }

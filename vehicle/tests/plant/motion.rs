@@ -2,12 +2,9 @@
 
 use super::{TUMBLING, config, moment, undisturbed};
 use nalgebra::{Vector3, Vector6};
-use proptest::prelude::*;
 use vehicle::actuators::Command;
 use vehicle::kinematics::Kinematics;
-use vehicle::plant::{
-    Config, Input, Load, Partials, Plant, State, derivative, partial_derivatives,
-};
+use vehicle::plant::{Config, Input, Load, Plant, State, derivative};
 use vehicle::trajectory::Trajectory;
 
 #[test]
@@ -75,43 +72,6 @@ fn oracle_delta_is_an_acceleration_of_x_omega() {
             (x_omega(state + f * h) - x_omega(state - f * h)) / (2.0 * h)
         };
         assert!((x_omega_rate(delta) - x_omega_rate(Vector3::zeros()) - delta).amax() < 1e-9);
-    }
-}
-
-proptest! {
-    #[test]
-    fn oracle_partial_derivatives_against_differences(
-        values in proptest::array::uniform6(-1.0..1.0),
-        pushes in proptest::array::uniform3(-1e5..1e5),
-        deltas in proptest::array::uniform3(-0.04..0.04),
-        turns in proptest::array::uniform3(-0.1..0.1),
-    ) {
-        let body = *Plant::new(&config(), 0.0).unwrap().body();
-        let state = State::from(values);
-        let load = Load {
-            moment: Vector3::from(pushes),
-            delta: Vector3::from(deltas),
-            turn_rate: Vector3::from(turns),
-        };
-        for kinematics in [Kinematics::Printed, Kinematics::Exact] {
-            let Partials { by_state, by_moment, by_turn_rate } =
-                partial_derivatives(&body, kinematics, &state, &load);
-            let f = |state: &State, load: &Load| derivative(&body, kinematics, state, load);
-            for i in 0..6 {
-                let h = State::from_fn(|j, _| if i == j { 1e-5 } else { 0.0 });
-                let numeric = (f(&(state + h), &load) - f(&(state - h), &load)) / 2e-5;
-                prop_assert!((numeric - by_state.column(i)).amax() < 1e-7, "state {}: {}", i, numeric - by_state.column(i));
-            }
-            for i in 0..3 {
-                let h = Vector3::from_fn(|j, _| if i == j { 1e4 } else { 0.0 });
-                let pushed = |by: f64| f(&state, &Load { moment: load.moment + h * by, ..load });
-                let numeric = (pushed(1.0) - pushed(-1.0)) / 2e4;
-                prop_assert!((numeric - by_moment.column(i)).amax() < 1e-16);
-                let turned = |by: f64| f(&state, &Load { turn_rate: load.turn_rate + h * by, ..load });
-                let numeric = (turned(1e-5) - turned(-1e-5)) / 0.2;
-                prop_assert!((numeric - by_turn_rate.column(i)).amax() < 1e-12);
-            }
-        }
     }
 }
 

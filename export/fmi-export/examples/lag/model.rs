@@ -177,19 +177,4 @@ impl Model for Lag {
     fn event_indicators(&self, indicators: &mut [f64]) {
         indicators[0] = self.x - 1.0;
     }
-
-    fn partial_derivative(
-        &mut self,
-        time: f64,
-        unknown: &str,
-        known: &str,
-    ) -> Result<Option<f64>, Failure> {
-        let gain = self.gain(time);
-        Ok(Some(match (unknown, known) {
-            ("der(x)", "u") => gain / self.time_constant,
-            ("der(x)", "x") => -1.0 / self.time_constant,
-            ("x", "x") | ("y", "u" | "x") => 1.0,
-            _ => 0.0,
-        }))
-    }
 }

@@ -194,12 +194,8 @@ impl Instance {
         for (i, &reference) in references.iter().enumerate() {
             let value = value(i).map_err(Failure::Error)?;
             let position = self.position(reference);
-            if let Some(place) = self.states.iter().position(|state| state.0 == position) {
-                value.put(self.model.as_mut(), position);
-                self.set_state(place, position);
-                continue;
-            }
-            if value.put(self.model.as_mut(), position) {
+            let changes = value.put(self.model.as_mut(), position);
+            if !self.take_as_state(position) && changes {
                 self.stale = true;
                 if self.description.variables[position].causality == Causality::Parameter {
                     self.progress.initialized = false;
@@ -209,12 +205,16 @@ impl Instance {
         Ok(())
     }
 
-    /// Takes a state's variable as the state.
-    fn set_state(&mut self, place: usize, position: usize) {
+    /// Takes the value of a variable as the state, if it is one. Returns whether it is.
+    fn take_as_state(&mut self, position: usize) -> bool {
+        let Some(place) = self.states.iter().position(|state| state.0 == position) else {
+            return false;
+        };
         self.model.continuous_states(&mut self.trial);
         self.trial[place] = *self.model.real(position).expect("only a Real is a state");
         self.model.set_continuous_states(&self.trial);
         self.stale = true;
+        true
     }
 
     /// Checks that a variable may be set now: in continuous-time mode also a state. A discrete Real
@@ -287,39 +287,44 @@ impl Instance {
             }
         }
         self.refresh()?;
-        let time = self.progress.time;
-        let (rows, columns) = if adjoint { (knowns, unknowns) } else { (unknowns, knowns) };
-        for (i, &row) in rows.iter().enumerate() {
-            let mut sum = 0.0;
-            for (&column, seed) in columns.iter().zip(seed) {
-                let (unknown, known) = if adjoint { (column, row) } else { (row, column) };
-                let (unknown, known) = (self.position(unknown), self.position(known));
-                let derivative = match self.model.partial_derivative(time, unknown, known)? {
-                    Some(derivative) => derivative,
-                    None => self.difference(unknown, known)?,
-                };
-                sum += derivative * seed;
+        let mut sums = vec![0.0; if adjoint { knowns.len() } else { unknowns.len() }];
+        for (column, &known) in knowns.iter().enumerate() {
+            for (row, slope) in self.slopes(unknowns, self.position(known))?.enumerate() {
+                let (place, weight) = if adjoint { (column, row) } else { (row, column) };
+                sums[place] += slope * seed[weight];
             }
-            derivative.put(i, sum);
         }
+        sums.into_iter().enumerate().for_each(|(i, sum)| derivative.put(i, sum));
         Ok(())
     }
 
-    /// Returns the partial derivative by a difference of fourth order.
-    fn difference(&mut self, unknown: usize, known: usize) -> Result<f64, Failure> {
+    /// Returns the partial derivatives of the unknowns with respect to a state or an input:
+    /// differences of fourth order.
+    fn slopes(
+        &mut self,
+        unknowns: &[u32],
+        known: usize,
+    ) -> Result<impl Iterator<Item = f64> + use<>, Failure> {
         let h = 1e-3 * self.description.variables[known].nominal();
         let before = self.model.real(known).map_or(0.0, |value| *value);
-        let mut values = [0.0; 4];
-        for (value, steps) in values.iter_mut().zip([-2.0, -1.0, 1.0, 2.0]) {
-            (before + steps * h).put(self.model.as_mut(), known);
+        let mut values = [-2.0, -1.0, 1.0, 2.0].map(|steps| (before + steps * h, Vec::new()));
+        for (value, shown) in &mut values {
+            value.put(self.model.as_mut(), known);
+            self.take_as_state(known);
             let result = self.model.calculate(self.progress.time, self.progress.last_event);
-            *value = self.model.real(unknown).map_or(0.0, |value| *value);
+            for unknown in unknowns {
+                let reference = self.position(*unknown);
+                shown.push(self.model.real(reference).map_or(0.0, |value| *value));
+            }
             before.put(self.model.as_mut(), known);
+            self.take_as_state(known);
             self.stale = true;
             result?;
         }
-        let [far_below, below, above, far_above] = values;
-        Ok((8.0 * (above - below) - (far_above - far_below)) / (12.0 * h))
+        let [far_below, below, above, far_above] = values.map(|(_, shown)| shown);
+        Ok((0..unknowns.len()).map(move |i| {
+            (8.0 * (above[i] - below[i]) - (far_above[i] - far_below[i])) / (12.0 * h)
+        }))
     }
 }
 
@@ -375,7 +380,8 @@ mod tests {
         };
         let mut instance = Instance::new(&export, described.description.clone(), setting);
         for (unknown, known, exact) in [(2, 0, 1.0), (2, 1, -12.0), (1, 1, 1.0), (1, 0, 0.0)] {
-            let derivative = instance.difference(unknown, known).unwrap();
+            let mut slopes = instance.slopes(&[unknown], known).unwrap();
+            let derivative = slopes.next().unwrap();
             assert!((derivative - exact).abs() < 1e-9, "{unknown} by {known}: {derivative}");
         }
         assert_eq!(instance.model.real(1).copied(), Some(2.0));
