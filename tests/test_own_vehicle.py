@@ -6,6 +6,8 @@ import shutil
 import subprocess
 
 import jsonschema
+import numpy as np
+import pandas as pd
 import pytest
 from fmpy.fmi1 import FMICallException
 
@@ -24,18 +26,63 @@ def schema() -> dict:
     return json.loads(printed)
 
 
-@pytest.mark.parametrize("text", [PAPERS, (DATA / "shuttle.toml").read_text(encoding="utf-8"), EXAMPLE.read_text(encoding="utf-8")])
+SHIPPED = [DATA / "shuttle.toml", *sorted((ENTRY / "vehicles").glob("*.toml"))]
+
+
+@pytest.mark.parametrize("text", [PAPERS, *(path.read_text(encoding="utf-8") for path in SHIPPED)])
 def test_vehicles_keep_to_their_schema(text):
     jsonschema.validate(tomllib.loads(text), schema(), cls=jsonschema.Draft7Validator)
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(tomllib.loads(text.replace("[forces.lift]", "[forces.left]")), schema())
 
 
-def test_the_example_flies_to_the_terminal_area(orchestrate):
-    finished, out = orchestrate(ENTRY / "own-vehicle.toml")
-    assert finished.returncode == 0, finished.stderr
+@pytest.mark.parametrize("name", ["own-vehicle", "orbiter", "capsule"])
+def test_the_examples_fly_to_their_targets(orchestrate, name):
+    finished, out = orchestrate(ENTRY / f"{name}.toml")
+    assert finished.returncode == 0 and "WARN" not in finished.stderr, finished.stderr
     metrics = json.loads((out / "metrics.json").read_text())
     assert metrics["completed"] and metrics["range_off_km"] < 5
+    assert metrics["worst_limit_ratio"] < 1
+
+
+def test_oracle_axes_turned_by_half_a_turn_about_y_give_the_same_flight(orchestrate, tmp_path):
+    """The capsule at 162 deg with its axis to the apex is the same at −18 deg with its axis to the heat shield."""
+    for folder in ("entry", "base"):
+        shutil.copytree(ENTRY.parent / folder, tmp_path / folder)
+    entry = tmp_path / "entry"
+
+    def changed(name: str, *pairs: tuple[str, str]) -> None:
+        text = (entry / name).read_text(encoding="utf-8")
+        for old, new in pairs:
+            assert old in text
+            text = text.replace(old, new)
+        (entry / name).write_text(text, encoding="utf-8")
+
+    given = tomllib.loads((entry / "vehicles" / "capsule.toml").read_text(encoding="utf-8"))
+    alpha = ", ".join(map(str, given["forces"]["lift"]["table"]["alpha_deg"]))
+    turned = ", ".join(str(angle - 180) for angle in given["forces"]["lift"]["table"]["alpha_deg"])
+    roll, _, yaw = (f"    {row},\n" for row in given["jets"]["moment"])
+    other = [f"    {[-value for value in row]},\n" for row in given["jets"]["moment"]]
+    changed(
+        "vehicles/capsule.toml",
+        (f"[{alpha}]", f"[{turned}]"),
+        ("[3.67, 0.0, -0.1128]", "[-3.67, 0.0, 0.1128]"),
+        (roll, other[0]),
+        (yaw, other[2]),
+    )
+    changed("capsule.toml", ("162 deg", "-18 deg"))
+    changed("capsule-guidance.toml", ("162 deg", "-18 deg"))
+    flights = []
+    for path in (ENTRY / "capsule.toml", entry / "capsule.toml"):
+        finished, out = orchestrate(path)
+        assert finished.returncode == 0, finished.stderr
+        flights.append(pd.read_csv(out / "results.csv"))
+    one, other = flights
+    same = ["motion.altitude", "motion.longitude", "motion.latitude", "motion.speed", "rate.q", "load.lift", "load.drag"]
+    for name in same:
+        np.testing.assert_allclose(one[f"plant.{name}"], other[f"plant.{name}"], rtol=1e-6, atol=1e-6)
+    for name in ("rate.p", "rate.r"):
+        np.testing.assert_allclose(one[f"plant.{name}"], -other[f"plant.{name}"], atol=1e-6)
 
 
 def test_different_vehicles_in_one_loop_are_warned_of(orchestrate):

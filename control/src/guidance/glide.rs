@@ -121,7 +121,7 @@ impl Glide {
     /// Returns the least altitude rate at which no load rises beyond its limit, m/s: for each load
     /// y ∼ ρᵃ Vᵇ, ẏ/y = −a ḣ/H + b V̇/V must be at most ln(limit/y)/τ.
     pub(super) fn least_rate(&self, model: &Model, limit: &Limit, loads: &Loads) -> f64 {
-        let exponents = [[0.5, model.heating_exponent()], [1.0, 2.0], [1.0, 2.0]];
+        let exponents = [model.heating_exponents(), [1.0, 2.0], [1.0, 2.0]];
         let scale = model.scale(self.altitude);
         let each = loads.all().into_iter().zip(limit.all()).zip(exponents);
         each.fold(f64::NEG_INFINITY, |least, ((load, largest), [a, b])| {

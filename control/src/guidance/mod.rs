@@ -166,6 +166,7 @@ impl Guidance {
     /// Names the setting that is out of range, or the limit that the end of the flight exceeds.
     pub fn of(settings: Settings, aerodynamics: Aerodynamics) -> Result<Self, DesignError> {
         ::settings::check(&settings)?;
+        settings.alpha.check()?;
         let predictor = Predictor::new(aerodynamics);
         let Target { altitude, speed, .. } = settings.target;
         let floor = Loads::at(&predictor.model, altitude, speed, settings.alpha.at(speed));
@@ -305,7 +306,8 @@ impl Guidance {
         let share = 1.0 - exp(-(TICKS as f64) * PERIOD / time);
         let actual = [measured.lift, measured.drag];
         for ((ratio, actual), predicted) in memory.ratios.iter_mut().zip(actual).zip(predicted) {
-            let latest = (actual / predicted).clamp(0.3, 3.0);
+            // A vehicle may have no lift.
+            let latest = if predicted == 0.0 { 1.0 } else { (actual / predicted).clamp(0.3, 3.0) };
             *ratio += share * (latest - *ratio);
         }
     }
@@ -318,10 +320,15 @@ impl Guidance {
         let model = &self.predictor.model;
         let mach = model.mach(self.settings.target.altitude, self.settings.target.speed);
         let lift = |angle: f64| model.coefficients(angle, mach)[0];
-        let slope = (lift(alpha.low + PROBE) - lift(alpha.low)) / PROBE;
-        let change = lift(alpha.low) * (1.0 / lift_ratio - 1.0) / slope;
-        let largest = self.settings.alpha.adjustment;
-        Alpha { low: alpha.low + change.clamp(-largest, largest), ..alpha }
+        let mut schedule = alpha;
+        let end = &mut schedule.schedule[0].angle;
+        let slope = (lift(*end + PROBE) - lift(*end)) / PROBE;
+        let change = lift(*end) * (1.0 / lift_ratio - 1.0) / slope;
+        // Lift that does not depend on the angle cannot be had by another one.
+        if change.is_finite() {
+            *end += change.clamp(-alpha.adjustment, alpha.adjustment);
+        }
+        schedule
     }
 
     /// Corrects the magnitude of the bank angle by the predicted miss: Lu 2014, section III, with

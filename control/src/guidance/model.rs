@@ -71,16 +71,17 @@ impl Model {
         self.aerodynamics.heat_flux(density, speed, alpha)
     }
 
-    /// Returns the power of the speed with which the heat flux grows.
-    pub(super) fn heating_exponent(&self) -> f64 {
-        self.aerodynamics.heating_exponent()
+    /// Returns the powers of density and speed with which the heat flux grows.
+    pub(super) fn heating_exponents(&self) -> [f64; 2] {
+        self.aerodynamics.heating_exponents()
     }
 
     /// Returns the relative change of the lift with the angle of attack at an angle of attack (rad)
-    /// and a Mach number, 1/rad.
+    /// and a Mach number, 1/rad; 0 without lift.
     pub(super) fn lift_slope(&self, alpha: f64, mach: f64) -> f64 {
         let lift = |angle: f64| self.coefficients(angle, mach)[0];
-        (lift(alpha + PROBE) / lift(alpha) - 1.0) / PROBE
+        let slope = (lift(alpha + PROBE) / lift(alpha) - 1.0) / PROBE;
+        if slope.is_finite() { slope } else { 0.0 }
     }
 
     /// Returns the coefficients of lift and drag at an angle of attack (rad) and a Mach number.

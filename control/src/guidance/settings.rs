@@ -1,7 +1,8 @@
 //! Settings of the guidance, with ours from `data/guidance.toml`.
 
-use ::settings::Declared;
+use ::settings::{Declared, Invalid};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 use std::sync::LazyLock;
 use vehicle::data::Tables;
 use vehicle::translation::Planet;
@@ -84,25 +85,33 @@ pub struct Bank {
     pub largest: f64,
 }
 
-/// Angle of attack over speed: constant, linear, and constant again.
+/// Most points of the schedule of the angle of attack.
+const POINTS: usize = 6;
+
+/// Angle of attack over speed: linear between points, and constant beyond the first and the last.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Alpha {
-    /// Angle of attack at high speed.
-    #[setting(unit = "rad", min = 0.0, max = 1.5, nominal = 0.1)]
-    pub high: f64,
-    /// Angle of attack at low speed.
-    #[setting(unit = "rad", min = 0.0, max = 1.5, nominal = 0.1)]
-    pub low: f64,
-    /// Largest change of alpha.low by which the flight ends at the target's altitude although its
-    /// lift differs from the predicted one.
+    /// Number of points of the schedule of the angle of attack that are used.
+    #[setting(min = 1, max = POINTS)]
+    pub points: usize,
+    /// Points of the schedule, in the order of their speeds.
+    #[setting(name = "", by_column, used_with = "alpha.points >= {#}")]
+    pub schedule: [Point; POINTS],
+    /// Largest change of alpha.angle[1] by which the flight ends at the target's altitude although
+    /// its lift differs from the predicted one.
     #[setting(unit = "rad", min = 0.0, max = 0.5, nominal = 0.1)]
     pub adjustment: f64,
-    /// Speed above which the angle of attack is alpha.high.
+}
+
+/// One point of the schedule of the angle of attack.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Point {
+    /// Speed at a point of the schedule (point {#}).
     #[setting(unit = "m/s", min = 0.0, nominal = 1e3)]
-    pub upper_speed: f64,
-    /// Speed below which the angle of attack is alpha.low.
-    #[setting(unit = "m/s", min = 0.0, nominal = 1e3)]
-    pub lower_speed: f64,
+    pub speed: f64,
+    /// Angle of attack at this speed (point {#}).
+    #[setting(unit = "rad", min = -PI, max = PI, nominal = 0.1)]
+    pub angle: f64,
 }
 
 /// Dead band of the heading, beyond which the bank is reversed.
@@ -259,16 +268,37 @@ pub(super) fn over_speed(speed: f64, [lower, upper]: [f64; 2], [low, high]: [f64
 impl Alpha {
     /// Returns the angle of attack of the schedule (rad) at a speed (m/s).
     pub fn at(&self, speed: f64) -> f64 {
-        over_speed(speed, [self.lower_speed, self.upper_speed], [self.low, self.high])
+        let [lower, upper] = self.about(speed);
+        over_speed(speed, [lower.speed, upper.speed], [lower.angle, upper.angle])
     }
-}
 
-impl Alpha {
     /// Returns the derivative of the schedule over speed, rad per m/s.
     pub(super) fn slope(&self, speed: f64) -> f64 {
-        let is_between = speed > self.lower_speed && speed < self.upper_speed;
-        let slope = (self.high - self.low) / (self.upper_speed - self.lower_speed);
+        let [lower, upper] = self.about(speed);
+        let is_between = speed > lower.speed && speed < upper.speed;
+        let slope = (upper.angle - lower.angle) / (upper.speed - lower.speed);
         if is_between { slope } else { 0.0 }
+    }
+
+    /// Returns the points about a speed (m/s), or the two that are nearest.
+    fn about(&self, speed: f64) -> [Point; 2] {
+        let used = &self.schedule[..self.points.clamp(1, POINTS)];
+        let upper =
+            used.partition_point(|point| point.speed < speed).clamp(1, used.len().max(2) - 1);
+        [used[upper - 1], used[upper.min(used.len() - 1)]]
+    }
+
+    /// Refuses points whose speeds do not increase.
+    pub(super) fn check(&self) -> Result<(), Invalid> {
+        let used = &self.schedule[..self.points];
+        let fault = (1..used.len()).find(|&i| used[i].speed <= used[i - 1].speed);
+        fault.map_or(Ok(()), |i| {
+            Err(Invalid {
+                name: format!("alpha.speed[{}]", i + 1),
+                value: used[i].speed,
+                problem: format!("must exceed alpha.speed[{i}]"),
+            })
+        })
     }
 }
 

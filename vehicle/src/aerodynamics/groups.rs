@@ -90,8 +90,8 @@ impl Moments {
     }
 }
 
-/// Heating of the leading edge, BTU/(ft² s): a polynomial of α times `factor` √ρ (V/10⁴
-/// ft/s)^`exponent`, with the density ρ in slug/ft³.
+/// Heating of the leading edge: a polynomial of α times `factor` ρᵃ Vᵇ with the density's power a,
+/// `density_exponent`, and the speed's b, `exponent`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -99,15 +99,37 @@ pub(crate) struct Heating {
     /// Publication or derivation from which the numbers come.
     #[serde(deserialize_with = "given::source")]
     pub source: String,
+    /// Units of flux, density and speed.
+    #[serde(default)]
+    pub units: HeatingUnits,
     /// Factors of 1, α, α², … with the angle of attack α in degrees.
     #[serde(deserialize_with = "given::all_finite")]
     pub polynomial: Vec<f64>,
-    /// Factor of √ρ.
+    /// Factor of the powers of density and speed.
     #[serde(deserialize_with = "given::finite")]
     pub factor: f64,
+    /// Power of the density.
+    #[serde(default = "half", deserialize_with = "given::positive")]
+    pub density_exponent: f64,
     /// Power of the speed.
     #[serde(deserialize_with = "given::finite")]
     pub exponent: f64,
+}
+
+/// Units of the heating's numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum HeatingUnits {
+    /// BTU/(ft² s), slug/ft³ and 10⁴ ft/s.
+    #[default]
+    Imperial,
+    /// W/m², kg/m³ and m/s.
+    Si,
+}
+
+fn half() -> f64 {
+    0.5
 }
 
 /// Air whose density falls exponentially with altitude. Only published checks of the data use it:

@@ -14,7 +14,7 @@ pub use coefficient::Coefficient;
 pub use surfaces::SurfaceTable;
 pub use units::FOOT;
 
-pub(crate) use groups::{ExponentialAir, Forces, Heating, Moments, Reference};
+pub(crate) use groups::{ExponentialAir, Forces, Heating, HeatingUnits, Moments, Reference};
 pub(crate) use surfaces::GivenTable;
 
 use crate::math::{exp, powf};
@@ -170,15 +170,24 @@ impl Aerodynamics {
     /// (m/s) and an angle of attack (rad); 0 without data of the heating.
     pub fn heat_flux(&self, density: f64, speed: f64, alpha: f64) -> f64 {
         let Some(heating) = &self.heating else { return 0.0 };
-        let Heating { polynomial: factors, factor, exponent, .. } = heating;
-        let density = density * FOOT * FOOT * FOOT / SLUG;
-        let flux = factor * density.sqrt() * powf(speed / FOOT / 1e4, *exponent);
-        coefficient::polynomial(factors, alpha.to_degrees()) * flux * BTU_PER_SQUARE_FOOT
+        let [a, b] = self.heating_exponents();
+        let (density, speed, unit) = match heating.units {
+            HeatingUnits::Imperial => {
+                (density * FOOT * FOOT * FOOT / SLUG, speed / FOOT / 1e4, BTU_PER_SQUARE_FOOT)
+            }
+            HeatingUnits::Si => (density, speed, 1.0),
+        };
+        // The root is exact on every platform, and by far the most common power.
+        let of_density = if a == 0.5 { density.sqrt() } else { powf(density, a) };
+        let flux = heating.factor * of_density * powf(speed, b);
+        coefficient::polynomial(&heating.polynomial, alpha.to_degrees()) * flux * unit
     }
 
-    /// Returns the power of the speed with which the heat flux grows.
-    pub fn heating_exponent(&self) -> f64 {
-        self.heating.as_ref().map_or(0.0, |heating| heating.exponent)
+    /// Returns the powers of density and speed with which the heat flux grows.
+    pub fn heating_exponents(&self) -> [f64; 2] {
+        self.heating
+            .as_ref()
+            .map_or([0.5, 0.0], |heating| [heating.density_exponent, heating.exponent])
     }
 
     /// Returns the name and the source of each group of numbers.
