@@ -13,7 +13,7 @@ use control::allocation::{
 use control::error::DesignError;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
-use vehicle::effectors::{Effectors, SURFACES};
+use vehicle::effectors::{EffectorFault, EffectorFaultKind, Effectors, SURFACES};
 
 /// Pressure at which the effectiveness is as printed, Pa.
 const PRESSURE: f64 = 2859.0;
@@ -409,4 +409,57 @@ fn below_the_threshold_of_blending_jets_alone_attain_moments() {
     // The surfaces are in proportion to the dynamic pressure, and within a period hardly move.
     assert!((twice.surfaces_alone / above.surfaces_alone - 2.0).abs() < 1e-12);
     assert!(above.in_period < above.attainable.radius);
+}
+
+/// A told failure of a surface or a jet is made up for by the others, and shrinks the ball; the
+/// moments count what the failed one gives.
+#[test]
+fn a_failure_that_is_told_is_made_up_for() {
+    use EffectorFaultKind::{Floating, JetOff, JetOn, Slow, Stuck};
+    let settings = Settings {
+        method: Method::Optimal,
+        jets: JetCommand::Duty,
+        period: 0.04,
+        ..Settings::published()
+    };
+    let effectors = settings.effectors.clone();
+    let mut command = Command {
+        moment: Vector3::new(2e3, -9e3, 4e3),
+        dynamic_pressure: 7e3,
+        ..Command::default()
+    };
+    let settle = |allocator: &mut Allocator,
+                  memory: &mut Memory,
+                  ticks: std::ops::Range<u64>,
+                  command: &Command| {
+        for tick in ticks {
+            allocator.update(memory, tick, command);
+        }
+    };
+    for kind in [Stuck, Floating, Slow, JetOn, JetOff] {
+        let fault = EffectorFault { kind, number: 6, start: 4.0, share: 0.1 };
+        let mut allocator = Allocator::new(Settings { fault, ..settings.clone() }).unwrap();
+        let mut memory = Memory::default();
+        settle(&mut allocator, &mut memory, 0..100, &command);
+        let before = memory;
+        command.moment *= -1.0;
+        settle(&mut allocator, &mut memory, 100..101, &command);
+        let change = (memory.surfaces[5] - before.surfaces[5]).abs();
+        let (largest, failed) = (effectors.rate[5] * settings.period, memory.surfaces[5]);
+        assert!(memory.attainable.radius < before.attainable.radius || kind == Slow, "{kind:?}");
+        settle(&mut allocator, &mut memory, 101..400, &command);
+        assert!(memory.residual.norm() < 1.0, "{kind:?}: {}", memory.residual);
+        let mut duty = memory.duty;
+        match kind {
+            Stuck => assert_eq!((change, memory.surfaces[5]), (0.0, before.surfaces[5])),
+            Floating => assert_eq!((failed, memory.surfaces[5]), (0.0, 0.0)),
+            Slow => assert!(change <= 0.1 * largest * (1.0 + 1e-9), "{change}"),
+            JetOn => duty[5] = 1.0,
+            _ => duty[5] = 0.0,
+        }
+        let given =
+            effectors.moment_of_surfaces(&memory.surfaces, 7e3) + effectors.moment_of_jets(&duty);
+        assert!((given - memory.achieved).norm() < 1e-6, "{kind:?}: {}", given - memory.achieved);
+        command.moment *= -1.0;
+    }
 }

@@ -13,6 +13,7 @@ use vehicle::disturbance::{
     Disturbance, DisturbanceKind, DisturbanceTable, MomentWave, Row, SineMoment,
 };
 use vehicle::dynamics::Inertia;
+use vehicle::effectors::EffectorFault;
 use vehicle::entry::{Motion, Passage};
 use vehicle::error::Error;
 use vehicle::kinematics::Kinematics;
@@ -110,6 +111,8 @@ pub(crate) struct Parameters {
     #[setting(name = "jets.symmetric")]
     #[setting(used_with = "actuation = surfacesAndJets")]
     pub(crate) jet_symmetric: bool,
+    #[setting(name = "effector.fault", used_with = "actuation = surfacesAndJets")]
+    pub(crate) effector_fault: EffectorFault,
     pub(crate) kinematics: Kinematics,
     /// Angular rate of the Earth: 7.2921e-5 rad/s, or 0 to neglect the rotation.
     #[setting(name = "trajectory.earthRate", unit = "rad/s", min = 0.0, max = 1.0, nominal = 1e-4)]
@@ -234,6 +237,7 @@ impl Default for Parameters {
             aerodynamics_scale: 1.0,
             jet_duty: false,
             jet_symmetric: false,
+            effector_fault: EffectorFault::default(),
             sensing: Sensing::default(),
             converter: Converter::default(),
             table: Table::default(),
@@ -295,6 +299,7 @@ impl Parameters {
             dynamic_pressure: self.dynamic_pressure()?,
             mach: self.flight.mach,
             aerodynamics_scale: self.aerodynamics_scale,
+            fault: self.effector_fault,
         }))
     }
 

@@ -13,13 +13,14 @@
 
 use crate::aerodynamics::{Flow, SurfaceTable};
 use crate::effectors::{
-    Effectors, JETS, Jets, SURFACE_NAMES, SURFACES, Surfaces, moment_of_tables,
+    EffectorFault, EffectorFaultKind, Effectors, JETS, Jets, SURFACE_NAMES, SURFACES, Surfaces,
+    moment_of_tables,
 };
 use crate::error::{Error, not_negative};
 use crate::time::tolerance;
 use nalgebra::{SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
-use settings::Declared;
+use settings::{Declared, Invalid};
 
 /// Command at or above which a jet in on-off mode is switched on.
 pub const THRESHOLD: f64 = 0.5;
@@ -47,6 +48,8 @@ pub struct Config {
     pub mach: f64,
     /// Factor from the nominal surface effectiveness to that of the vehicle.
     pub aerodynamics_scale: f64,
+    /// A surface or a jet that fails.
+    pub fault: EffectorFault,
 }
 
 /// Commands to the surfaces and jets.
@@ -73,7 +76,7 @@ impl Command {
 pub struct Drive {
     /// Target of each deflection, rad.
     target: Surfaces,
-    /// Direction in which each deflection moves: 1 up, −1 down, 0 at rest.
+    /// Direction in which each deflection moves: 1 up, −1 down, 0 at rest; less if it is slow.
     direction: Surfaces,
     /// Thrust of each jet as a fraction from 0 to 1.
     thrust: Jets,
@@ -103,6 +106,7 @@ pub struct Actuators {
     max: Surfaces,
     rate: Surfaces,
     jet_mode: JetMode,
+    fault: EffectorFault,
 }
 
 impl Actuators {
@@ -113,6 +117,9 @@ impl Actuators {
     pub fn new(config: &Config) -> Result<Self, Error> {
         let scale = config.aerodynamics_scale;
         not_negative("aerodynamics.scale", scale, "")?;
+        config.fault.check().map_err(|Invalid { name, value, problem }| {
+            Error::parameter(name, format!("= {value} {problem}"))
+        })?;
         let Effectors { min, max, rate, jet_moments, .. } = config.effectors;
         Ok(Self {
             condition: [config.dynamic_pressure, config.mach],
@@ -124,6 +131,7 @@ impl Actuators {
             max,
             rate,
             jet_mode: config.jet_mode,
+            fault: config.fault,
         })
     }
 
@@ -140,20 +148,35 @@ impl Actuators {
     }
 
     /// Returns the drive with the direction of each surface set from the distance left at `time`
-    /// (s).
-    pub fn directed(&self, time: f64, drive: Drive, deflections: &Surfaces) -> Drive {
+    /// (s), and with what a fault makes of it.
+    pub fn directed(&self, time: f64, mut drive: Drive, deflections: &Surfaces) -> Drive {
+        let (fault, failed) = self.fault.at(time);
+        match fault {
+            EffectorFaultKind::Stuck => drive.target[failed] = deflections[failed],
+            EffectorFaultKind::Floating => drive.target[failed] = 0.0,
+            EffectorFaultKind::JetOn => drive.thrust[failed] = 1.0,
+            EffectorFaultKind::JetOff => drive.thrust[failed] = 0.0,
+            EffectorFaultKind::None | EffectorFaultKind::Slow => {}
+        }
         let way = drive.target - deflections;
         // A distance that would be covered within the time tolerance counts as zero.
         let least = self.rate * tolerance(time);
-        let direction =
+        drive.direction =
             Surfaces::from_fn(|i, _| if way[i].abs() <= least[i] { 0.0 } else { way[i].signum() });
-        Drive { direction, ..drive }
+        if fault == EffectorFaultKind::Slow {
+            drive.direction[failed] *= self.fault.share;
+        }
+        drive
+    }
+
+    /// Returns the next time (s) after `time` at which something fails.
+    pub(crate) fn next_fault(&self, time: f64) -> Option<f64> {
+        self.fault.next(time)
     }
 
     /// Whether a restored drive holds only values that a drive can have.
     pub(crate) fn fits(drive: &Drive) -> bool {
-        (0..SURFACES)
-            .all(|i| drive.target[i].is_finite() && [-1.0, 0.0, 1.0].contains(&drive.direction[i]))
+        (0..SURFACES).all(|i| drive.target[i].is_finite() && drive.direction[i].abs() <= 1.0)
             && drive.thrust.iter().all(|value| value.is_finite())
     }
 
@@ -168,7 +191,7 @@ impl Actuators {
         let way = drive.target - deflections;
         Surfaces::from_fn(|i, _| match drive.direction[i] {
             0.0 => f64::INFINITY,
-            direction => direction * way[i] / self.rate[i],
+            direction => way[i] / (direction * self.rate[i]),
         })
     }
 
@@ -177,8 +200,10 @@ impl Actuators {
     pub fn settle(&self, time: f64, drive: &Drive, deflections: &mut Surfaces) {
         let way = drive.target - *deflections;
         for i in 0..SURFACES {
-            let left =
-                if drive.direction[i] == 0.0 { way[i].abs() } else { drive.direction[i] * way[i] };
+            let left = match drive.direction[i] {
+                0.0 => way[i].abs(),
+                direction => direction.signum() * way[i],
+            };
             if left <= self.rate[i] * tolerance(time) {
                 deflections[i] = drive.target[i];
             }

@@ -1,7 +1,9 @@
 //! Effectors of the vehicle: eight aerodynamic surfaces and ten jets, Wu 2015 (57)–(59), (63)–(65).
 
+mod fault;
 mod given;
 
+pub use fault::{EffectorFault, EffectorFaultKind};
 pub(crate) use given::{GivenJets, GivenSurfaces};
 
 use crate::aerodynamics::{Flow, SurfaceTable};

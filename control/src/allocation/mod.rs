@@ -19,7 +19,9 @@ use pwpf::Modulator;
 use serde::{Deserialize, Serialize};
 use vehicle::aerodynamics::Flow;
 use vehicle::axes::MOMENTS;
-use vehicle::effectors::{Effectors, JETS, Jets, SURFACE_NAMES, SURFACES, Surfaces};
+use vehicle::effectors::{
+    EffectorFaultKind, Effectors, JETS, Jets, SURFACE_NAMES, SURFACES, Surfaces,
+};
 
 /// Effectiveness D_RCS of the jets, N m at full thrust.
 type JetMatrix = SMatrix<f64, 3, JETS>;
@@ -151,6 +153,10 @@ pub struct Allocator {
     problem: OptimalAllocation,
     /// The allocation problem without jets, for blending.
     without_jets: OptimalAllocation,
+    /// Moment of a jet that stays on, N m.
+    always: Vector3<f64>,
+    /// The allocator from the time on at which a surface or a jet fails.
+    failed: Option<Box<Self>>,
 }
 
 /// Remainder of the moment, as a fraction of it, that counts as rounding.
@@ -163,6 +169,12 @@ impl Allocator {
     /// Returns an error that names the setting at fault.
     pub fn new(settings: Settings) -> Result<Self, DesignError> {
         let ratio = settings.ratio()?;
+        let failed = if settings.fault.kind == EffectorFaultKind::None {
+            None
+        } else {
+            let (settings, always) = settings.failed();
+            Some(Box::new(Self { always, ..Self::new(settings)? }))
+        };
         let limits = settings.limits();
         let range = limits.1 - limits.0;
         let weight =
@@ -180,7 +192,8 @@ impl Allocator {
         let alone = Weights { moment: weights.moment.component_mul(&scarcity(jets)), ..weights };
         let (problem, without_jets) =
             (problem(weights, jets)?, problem(alone, &JetMatrix::zeros())?);
-        Ok(Self { settings, limits, ratio, problem, without_jets })
+        let always = Vector3::zeros();
+        Ok(Self { settings, limits, ratio, problem, without_jets, always, failed })
     }
 
     /// Returns the settings of the allocator.
@@ -205,6 +218,11 @@ impl Allocator {
     /// Evaluates the tick with number `tick`. An allocation is computed at every [`Self::ratio`]-th
     /// tick; the jets may switch at each.
     pub fn update(&mut self, memory: &mut Memory, tick: u64, command: &Command) {
+        let time = tick as f64 * self.period();
+        let has_failed = self.settings.fault.at(time).0 != EffectorFaultKind::None;
+        if let Some(failed) = self.failed.as_mut().filter(|_| has_failed) {
+            return failed.update(memory, tick, command);
+        }
         let modulated = self.settings.jets == JetCommand::Pwpf;
         if modulated && tick > 0 {
             for (state, &duty) in memory.modulators.iter_mut().zip(&memory.duty) {
@@ -220,7 +238,7 @@ impl Allocator {
             memory.duty
         };
         memory.modulated =
-            memory.by_surfaces + self.settings.effectors.moment_of_jets(&memory.jets);
+            memory.by_surfaces + self.settings.effectors.moment_of_jets(&memory.jets) + self.always;
     }
 
     fn allocate(&mut self, memory: &mut Memory, command: &Command) {
@@ -229,16 +247,16 @@ impl Allocator {
         let effectors = &self.settings.effectors;
         let mut matrix = effectors.effectiveness_at(dynamic_pressure);
         // Wu 2015, (59) for one period: the range, and the part of it that the rate permits.
-        let (min, max) = &self.limits;
         let change = self.settings.effectors.rate * self.settings.period;
-        let before = clamp(&memory.surfaces, min, max);
+        let before = clamp(&memory.surfaces, &self.limits.0, &self.limits.1);
+        let (min, max) = &self.limits(&before);
         let mut low = (before - change).sup(min);
         let mut high = (before + change).inf(max);
         let finite = commanded.iter().all(|value| value.is_finite())
             && dynamic_pressure.is_finite()
             && (command.alpha * command.mach).is_finite();
         // Tables of surfaces are linearised over the deflections in reach: exact at their ends.
-        let mut moment = commanded;
+        let mut moment = commanded - self.always;
         if !effectors.tables.is_empty() {
             let (slopes, offset) = secant(effectors, &command.flow(), &low, &high);
             matrix += slopes;
@@ -274,7 +292,7 @@ impl Allocator {
         memory.duty = duty.map(|duty| duty.clamp(0.0, 1.0));
         memory.by_surfaces = effectors.effectiveness_at(dynamic_pressure) * memory.surfaces
             + effectors.moment_of_tables(&command.flow(), &memory.surfaces);
-        memory.achieved = memory.by_surfaces + effectors.moment_of_jets(&memory.duty);
+        memory.achieved = memory.by_surfaces + effectors.moment_of_jets(&memory.duty) + self.always;
         memory.residual = commanded - memory.achieved;
         memory.report = AllocationReport {
             status: if optimum.is_some() {
@@ -290,6 +308,16 @@ impl Allocator {
 }
 
 impl Allocator {
+    /// Returns the smallest and largest deflections (rad): a surface that does not move stays
+    /// `before` (rad).
+    fn limits(&self, before: &Surfaces) -> (Surfaces, Surfaces) {
+        let rate = &self.settings.effectors.rate;
+        let within = |limits: &Surfaces| {
+            Surfaces::from_fn(|i, _| if rate[i] > 0.0 { limits[i] } else { before[i] })
+        };
+        (within(&self.limits.0), within(&self.limits.1))
+    }
+
     /// Finds the moments that can be attained. The model of the surfaces within one period is given:
     /// its slopes, its moment at zero deflection (N m), and the deflections in reach.
     fn attain(
@@ -302,15 +330,16 @@ impl Allocator {
         let effectors = &self.settings.effectors;
         let rests = self.settings.method == Method::Blending
             && command.dynamic_pressure < self.settings.threshold;
-        let at_rest = (Surfaces::zeros(), Surfaces::zeros());
-        let (min, max) = if rests { &at_rest } else { &self.limits };
+        let (min, max) = &self.limits(&clamp(&memory.surfaces, &self.limits.0, &self.limits.1));
+        let at_rest = clamp(&Surfaces::zeros(), min, max);
+        let (min, max) = if rests { (&at_rest, &at_rest) } else { (min, max) };
         let reach = if rests { (min, max) } else { reach };
         let mut matrix = effectors.effectiveness_at(command.dynamic_pressure);
-        let mut offset = Vector3::zeros();
+        let mut offset = self.always;
         if !effectors.tables.is_empty() {
             let (slopes, at_zero) = secant(effectors, &command.flow(), min, max);
             matrix += slopes;
-            offset = at_zero;
+            offset += at_zero;
         }
         let with_jets = |matrix: &SMatrix<f64, 3, SURFACES>, low: &Surfaces, high: &Surfaces| {
             std::array::from_fn::<Reach, { SURFACES + JETS }, _>(|i| {

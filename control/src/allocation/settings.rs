@@ -8,7 +8,7 @@ use settings::{Choice, Declared};
 use std::sync::LazyLock;
 use vehicle::axes::NUMBERED_AXES;
 use vehicle::data::Tables;
-use vehicle::effectors::{Effectors, Surfaces};
+use vehicle::effectors::{EffectorFault, EffectorFaultKind, Effectors, Surfaces};
 
 /// Method that divides the moment among the effectors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
@@ -59,6 +59,10 @@ pub struct Settings {
     /// as printed, whose optimum is not unique.
     #[setting(name = "weight.surface", min = 0.0)]
     pub weight_surface: f64,
+    /// A surface or a jet whose failure the allocator knows, from a time after the start of the
+    /// simulation on.
+    #[setting(name = "effector.fault")]
+    pub fault: EffectorFault,
     /// Model of surfaces and jets and of their limits that the allocator uses.
     #[setting(skip)]
     pub effectors: Effectors,
@@ -88,12 +92,36 @@ impl Settings {
         (within(min), within(max))
     }
 
+    /// Returns the settings once the fault has come, and the moment (N m) that a jet then gives
+    /// all the time.
+    pub(super) fn failed(&self) -> (Self, Vector3<f64>) {
+        let mut settings = Self { fault: EffectorFault::default(), ..self.clone() };
+        let (kind, failed) = self.fault.at(f64::INFINITY);
+        let Effectors { rate, allowed, jet_moments, .. } = &mut settings.effectors;
+        let mut always = Vector3::zeros();
+        match kind {
+            EffectorFaultKind::None => {}
+            // Within a period it moves nowhere.
+            EffectorFaultKind::Stuck => rate[failed] = 0.0,
+            EffectorFaultKind::Floating => allowed[failed] = false,
+            EffectorFaultKind::Slow => rate[failed] *= self.fault.share,
+            EffectorFaultKind::JetOn | EffectorFaultKind::JetOff => {
+                if kind == EffectorFaultKind::JetOn {
+                    always = jet_moments.column(failed).into();
+                }
+                jet_moments.fill_column(failed, 0.0);
+            }
+        }
+        (settings, always)
+    }
+
     /// Checks all settings and returns the number of ticks per allocation.
     ///
     /// # Errors
     /// Returns an error that names the setting at fault.
     pub(super) fn ratio(&self) -> Result<u64, DesignError> {
         settings::check(self)?;
+        self.fault.check()?;
         if self.jets == JetCommand::Duty {
             return Ok(1);
         }

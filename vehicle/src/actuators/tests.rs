@@ -9,7 +9,9 @@ const FIXED: Conditions = Conditions::Fixed(0.0);
 fn biased(jet_mode: JetMode, pressure: f64, aerodynamics_scale: f64) -> Actuators {
     let effectors = Effectors::published();
     let dynamic_pressure = pressure * effectors.reference_pressure;
-    let config = Config { effectors, jet_mode, dynamic_pressure, mach: 9.8, aerodynamics_scale };
+    let fault = EffectorFault::default();
+    let config =
+        Config { effectors, jet_mode, dynamic_pressure, mach: 9.8, aerodynamics_scale, fault };
     Actuators::new(&config).unwrap()
 }
 
@@ -106,4 +108,38 @@ fn aerodynamics_and_density_biases_multiply() {
     let (nominal, biased) = (moment(1.0, 1.0), moment(0.9, 0.8));
     assert!(nominal.amin() > 500.0);
     assert!((biased - nominal * 0.72).amax() < 1e-9);
+}
+
+#[test]
+fn a_surface_that_fails_stays_floats_or_is_slow_and_a_jet_stays_on_or_off() {
+    use EffectorFaultKind::{Floating, JetOff, JetOn, Slow, Stuck};
+    let command = Command { jets: Jets::repeat(0.6), ..surfaces([-20.0; SURFACES]) };
+    let at = surfaces([-5.0; SURFACES]).surfaces;
+    for (kind, rate, jet) in [
+        (Stuck, 0.0, 0.6),
+        (Floating, 10.0, 0.6),
+        (Slow, -2.0, 0.6),
+        (JetOn, -10.0, 1.0),
+        (JetOff, -10.0, 0.0),
+    ] {
+        let fault = EffectorFault { kind, number: 3, start: 7.0, share: 0.2 };
+        let actuators = Actuators { fault, ..actuators(JetMode::Duty) };
+        let healthy = actuators.commanded(6.99, &command, &at);
+        assert_eq!((degrees(&actuators.rates(&healthy))[2], healthy.thrust[2]), (-10.0, 0.6));
+        assert_eq!((actuators.next_fault(6.99), actuators.next_fault(7.0)), (Some(7.0), None));
+        let drive = actuators.directed(7.0, healthy, &at);
+        assert!((degrees(&actuators.rates(&drive))[2] - rate).abs() < 1e-12, "{kind:?}");
+        assert_eq!((drive.thrust[2], drive.thrust[1]), (jet, 0.6), "{kind:?}");
+        assert_eq!(degrees(&actuators.rates(&drive))[0], -10.0);
+        // It arrives when its rate has covered the way, and stays there.
+        let left = actuators.time_left(&drive, &at)[2];
+        let mut reached = at + actuators.rates(&drive) * left.min(1e3);
+        actuators.settle(7.0 + left.min(1e3), &drive, &mut reached);
+        let end = match kind {
+            Stuck => -5.0,
+            Floating => 0.0,
+            _ => -20.0,
+        };
+        assert!((degrees(&reached)[2] - end).abs() < 1e-9, "{kind:?}: {}", degrees(&reached)[2]);
+    }
 }

@@ -37,11 +37,12 @@ impl Held {
 }
 
 impl Plant {
-    /// Next time (s) after `time` at which the disturbance jumps or a sample is taken or arrives.
+    /// Next time (s) after `time` at which the disturbance jumps, a sample is taken or arrives, or a
+    /// surface or a jet fails.
     pub fn next_event(&self, time: f64) -> Option<f64> {
         let jump = self.disturbance.next_change(self.start_time, time);
         let sample = self.sensors.as_ref().map(|sensors| sensors.next_event(time));
-        jump.into_iter().chain(sample).min_by(f64::total_cmp)
+        jump.into_iter().chain(sample).chain(self.next_fault(time)).min_by(f64::total_cmp)
     }
 
     /// Time (s) until each deflection comes to rest, infinite for one that is at rest.
@@ -57,7 +58,17 @@ impl Plant {
         let rest = self.actuators.is_some().then(|| time + self.time_left(held).min());
         let sample = self.sensors.as_ref().map(|sensors| sensors.next_sample(time));
         let arrival = self.transport.as_ref().and_then(|transport| transport.next_arrival(time));
-        jump.into_iter().chain(rest).chain(sample).chain(arrival).min_by(f64::total_cmp)
+        let fault = self.next_fault(time);
+        jump.into_iter()
+            .chain(rest)
+            .chain(sample)
+            .chain(arrival)
+            .chain(fault)
+            .min_by(f64::total_cmp)
+    }
+
+    fn next_fault(&self, time: f64) -> Option<f64> {
+        self.actuators.as_ref().and_then(|actuators| actuators.next_fault(time))
     }
 
     /// Returns the quantities that hold from `time` (s) on if commands are taken then. If a tick

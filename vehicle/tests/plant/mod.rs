@@ -11,7 +11,7 @@ use vehicle::actuators::{self, Command, JetMode};
 use vehicle::disturbance::{
     Disturbance, DisturbanceKind, DisturbanceTable, MomentWave, Row, SineMoment,
 };
-use vehicle::effectors::Effectors;
+use vehicle::effectors::{EffectorFault, Effectors};
 use vehicle::fixes::Devices;
 use vehicle::plant::{Config, State};
 use vehicle::sensor_data::SensorData;
@@ -71,6 +71,7 @@ fn actuated(initial: State, jet_mode: JetMode) -> Config {
         dynamic_pressure,
         mach: 9.8,
         aerodynamics_scale: 1.0,
+        fault: EffectorFault::default(),
     };
     Config { actuators: Some(actuators), ..undisturbed(initial, 0.05) }
 }
