@@ -30,10 +30,13 @@ fn bar(length: u64, quiet: bool, template: &str) -> ProgressBar {
     bar
 }
 
-/// Formats the number of parts per second, with one digit after the point if it is small.
+/// Formats the number of parts per second, or per minute if they are slow, with one digit after the
+/// point if it is small.
 fn rate(per_second: f64) -> String {
-    let digits = usize::from(per_second < 9.95);
-    format!("{per_second:.digits$} per second")
+    let (rate, unit) =
+        if per_second < 1.0 { (60.0 * per_second, "minute") } else { (per_second, "second") };
+    let digits = usize::from(rate < 9.95);
+    format!("{rate:.digits$} per {unit}")
 }
 
 /// A progress bar of a run, which is redrawn a few times a second.
@@ -141,7 +144,8 @@ mod tests {
     #[test]
     fn rates_have_units_and_no_more_digits_than_matter() {
         let rates = [64.3074, 9.9499, 9.951, 0.25, 0.0].map(rate);
-        let expected = ["64", "9.9", "10", "0.2", "0.0"].map(|text| format!("{text} per second"));
+        let expected =
+            ["64 per second", "9.9 per second", "10 per second", "15 per minute", "0.0 per minute"];
         assert_eq!(rates, expected);
     }
 }

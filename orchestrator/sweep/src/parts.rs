@@ -11,14 +11,18 @@ use std::fs;
 use std::ops::Range;
 use std::path::PathBuf;
 
-/// Number of cases in a part: few, so that little work occupies all cores and loses little when it
-/// ends early.
-const LENGTH: u64 = 25;
+/// Returns the number of cases in the part that begins at a case: few, so that little work occupies
+/// all cores and loses little when it ends early. Where cases are slow there are few of them.
+fn length(start: u64) -> u64 {
+    if start < 100 { 5 } else { 25 }
+}
 
 /// Returns the parts of so many cases. Those of fewer cases are the first of them, except for the
 /// last.
 pub fn parts(cases: u64) -> impl Iterator<Item = Range<u64>> {
-    (0..cases.div_ceil(LENGTH)).map(move |i| i * LENGTH..cases.min((i + 1) * LENGTH))
+    std::iter::successors(Some(0), |start| Some(start + length(*start)))
+        .take_while(move |start| *start < cases)
+        .map(move |start| start..cases.min(start + length(start)))
 }
 
 /// Folder of the parts that are made from inputs with these hashes.
