@@ -1,26 +1,15 @@
 //! The page `documentation/index.html` of an FMU, made from its description.
 
-use crate::variable::{Causality, Variable, VariableKind};
+use crate::variable::{Causality, EnumerationType, Variable, VariableKind};
 use crate::{AUTHOR, LICENSE, ModelDescription, Version};
-use quick_xml::escape::escape;
-use std::fmt::Write;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 const STYLE: &str = include_str!("page.css");
 
 impl ModelDescription {
     /// Returns the page `documentation/index.html`: the FMU's text, then tables of its
     /// variables. The page needs no network.
-    ///
-    /// # Panics
-    /// This never panics, because writing to a string does not fail.
     pub fn to_html(&self, version: Version) -> String {
-        let mut page = String::new();
-        self.write_html(&mut page, version).expect("writing to a string");
-        page
-    }
-
-    fn write_html(&self, page: &mut String, version: Version) -> std::fmt::Result {
-        let name = escape(&self.name);
         let interface = match (self.co_simulation, self.model_exchange) {
             (true, true) => "co-simulation and model exchange",
             (true, false) => "co-simulation",
@@ -31,93 +20,83 @@ impl ModelDescription {
             Version::Fmi3 => ("FMI 3.0", "Instantiation token"),
         };
         let experiment = self.default_experiment;
-        write!(
-            page,
-            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-             <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n\
-             <title>{name}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
-             <h1>{name}</h1>\n<p class=\"lead\">{}</p>\n\
-             <dl>\n<dt>Interface</dt><dd>{standard}, {interface}</dd>\n<dt>Version</dt><dd>{}</dd>\n\
-             <dt>{identity}</dt><dd><code>{}</code></dd>\n\
-             <dt>Default experiment</dt><dd>{} s to {} s, communication step {} s</dd>\n</dl>\n\
-             {}\n",
-            escape(&self.description),
-            escape(&self.version),
-            self.guid(),
-            number(experiment.start),
-            number(experiment.stop),
-            number(experiment.step),
-            self.documentation,
-        )?;
-        self.write_table(page, "Parameters", Causality::Parameter)?;
-        self.write_table(page, "Inputs", Causality::Input)?;
-        self.write_table(page, "Outputs", Causality::Output)?;
-        self.write_table(page, "Local variables", Causality::Local)?;
-        self.write_enumeration_lists(page)?;
-        let (author, license) = (escape(AUTHOR), escape(LICENSE));
-        write!(page, "<p class=\"quiet\">{author}. Licence: {license}.</p>\n</body>\n</html>\n")
+        let [start, stop, step] = [experiment.start, experiment.stop, experiment.step].map(number);
+        let page = html! {
+            (DOCTYPE)
+            html lang="en" {
+                head {
+                    meta charset="utf-8";
+                    meta name="viewport" content="width=device-width,initial-scale=1";
+                    title { (self.name) }
+                    style { (PreEscaped(STYLE)) }
+                }
+                body {
+                    h1 { (self.name) }
+                    p.lead { (self.description) }
+                    dl {
+                        dt { "Interface" } dd { (standard) ", " (interface) }
+                        dt { "Version" } dd { (self.version) }
+                        dt { (identity) } dd { code { (self.guid()) } }
+                        dt { "Default experiment" }
+                        dd { (start) " s to " (stop) " s, communication step " (step) " s" }
+                    }
+                    (PreEscaped(&self.documentation))
+                    (self.table("Parameters", Causality::Parameter))
+                    (self.table("Inputs", Causality::Input))
+                    (self.table("Outputs", Causality::Output))
+                    (self.table("Local variables", Causality::Local))
+                    @for enumeration in self.enumerations() {
+                        h2 { (enumeration.name) }
+                        p { (enumeration.description) }
+                        dl {
+                            @for ((item, description), value) in enumeration.items.iter().zip(1..) {
+                                dt { (value) " " code { (item) } } dd { (description) }
+                            }
+                        }
+                    }
+                    p.quiet { (AUTHOR) ". Licence: " (LICENSE) "." }
+                }
+            }
+        };
+        page.into_string()
     }
 
-    fn write_table(
-        &self,
-        page: &mut String,
-        title: &str,
-        causality: Causality,
-    ) -> std::fmt::Result {
-        let rows: Vec<_> =
-            self.variables.iter().filter(|variable| variable.causality == causality).collect();
-        if rows.is_empty() {
-            return Ok(());
+    fn table(&self, title: &str, causality: Causality) -> Markup {
+        let rows = || self.variables.iter().filter(|variable| variable.causality == causality);
+        let started = rows().any(|variable| !variable.is_calculated());
+        html! {
+            @if rows().next().is_some() {
+                h2 { (title) }
+                div.wide tabindex="0" role="region" aria-label=(title) { table {
+                    tr {
+                        th { "Name" } th { "Unit" } @if started { th { "Start" } }
+                        th { "Limits" } th { "Description" }
+                    }
+                    @for variable in rows() {
+                        tr {
+                            td { code { (variable.name) } }
+                            td { (unit(variable)) }
+                            @if started { td { (start_value(variable)) } }
+                            td { (limits(variable)) }
+                            td { (variable.description) }
+                        }
+                    }
+                } }
+            }
         }
-        let started = rows.iter().any(|variable| !variable.is_calculated());
-        let start = if started { "<th>Start</th>" } else { "" };
-        write!(
-            page,
-            "<h2>{title}</h2>\n<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"{title}\"><table>\n\
-             <tr><th>Name</th><th>Unit</th>{start}<th>Limits</th><th>Description</th></tr>\n"
-        )?;
-        for variable in rows {
-            let start = if started {
-                format!("<td>{}</td>", escape(start_value(variable)))
-            } else {
-                String::new()
-            };
-            writeln!(
-                page,
-                "<tr><td><code>{}</code></td><td>{}</td>{start}<td>{}</td><td>{}</td></tr>",
-                escape(&variable.name),
-                escape(unit(variable)),
-                escape(limits(variable)),
-                escape(&variable.description),
-            )?;
-        }
-        page.push_str("</table></div>\n");
-        Ok(())
     }
 
-    fn write_enumeration_lists(&self, page: &mut String) -> std::fmt::Result {
-        let mut seen = vec![];
+    /// Returns the enumerations of the variables, each once.
+    pub(crate) fn enumerations(&self) -> Vec<&EnumerationType> {
+        let mut seen: Vec<&EnumerationType> = Vec::new();
         for variable in &self.variables {
-            let VariableKind::Enumeration { enumeration_type, .. } = &variable.kind else {
-                continue;
-            };
-            if seen.contains(&&enumeration_type.name) {
-                continue;
+            if let VariableKind::Enumeration { enumeration_type, .. } = &variable.kind
+                && !seen.iter().any(|other| other.name == enumeration_type.name)
+            {
+                seen.push(enumeration_type);
             }
-            seen.push(&enumeration_type.name);
-            write!(
-                page,
-                "<h2>{}</h2>\n<p>{}</p>\n<dl>\n",
-                escape(&enumeration_type.name),
-                escape(&enumeration_type.description)
-            )?;
-            for ((item, description), value) in enumeration_type.items.iter().zip(1..) {
-                let (item, description) = (escape(item), escape(description));
-                writeln!(page, "<dt>{value} <code>{item}</code></dt><dd>{description}</dd>")?;
-            }
-            page.push_str("</dl>\n");
         }
-        Ok(())
+        seen
     }
 }
 

@@ -175,14 +175,7 @@ impl ModelDescription {
     }
 
     fn write_enumerations(&self, xml: &mut Xml, version: Version) -> io::Result<()> {
-        let mut enumerations: Vec<&EnumerationType> = vec![];
-        for variable in &self.variables {
-            if let VariableKind::Enumeration { enumeration_type, .. } = &variable.kind
-                && !enumerations.contains(&enumeration_type)
-            {
-                enumerations.push(enumeration_type);
-            }
-        }
+        let mut enumerations = self.enumerations();
         if enumerations.is_empty() {
             return Ok(());
         }
