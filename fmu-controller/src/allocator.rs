@@ -41,7 +41,7 @@ impl SampledInstance for AllocatorInstance {
 
     fn description() -> Description<ControlAllocator> {
         let table = VariableTable::new(|m: &mut ControlAllocator| &mut **m);
-        let table = table.and(|m| &mut m.settings.pwpf).before("pwpf.", "vehicle.file");
+        let table = table.and(|m| &mut m.settings.pwpf);
         Description {
             documentation: include_str!("allocator.html").into(),
             version: env!("CARGO_PKG_VERSION"),

@@ -69,7 +69,7 @@ impl SampledInstance for EstimatorInstance {
             ..Description::new(
                 "AttitudeEstimator",
                 "Attitude and rates from gyroscope, accelerometer and magnetometer, as on the platform of Chai et al. (2022)",
-                table.before("filter.delay", "estimatedBias"),
+                table,
             )
         }
     }

@@ -65,7 +65,7 @@ impl SampledInstance for GuidanceInstance {
             ..Description::new(
                 "EntryGuidance",
                 "Guidance of an entry flight to the terminal area by a predictor-corrector, Lu (2014)",
-                table.before("margins.", "limits."),
+                table,
             )
         }
     }

@@ -6,41 +6,10 @@ use model_description::DefaultExperiment;
 use model_description::variable::Variable;
 use vehicle::Scenario;
 
-/// Variables that stand elsewhere than their fields: beginnings of their names, and that of the
-/// variable before which they stand. Value references keep their places when fields move.
-const PLACES: [(&str, &str); 23] = [
-    ("deflection[", "trajectory."),
-    ("flight.dynamicPressure", "trajectory."),
-    ("surface[", "trajectory."),
-    ("jet[", "trajectory."),
-    ("deflectionRate[", "trajectory."),
-    ("measured.", "sensor.set"),
-    ("gnss.", "sensor.set"),
-    ("star.", "sensor.set"),
-    ("flight.standardDynamicPressure", "translation"),
-    ("motion.", "translation"),
-    ("motionRate.", "translation"),
-    ("flow.", "translation"),
-    ("load", "translation"),
-    ("heating.", "translation"),
-    ("downrange", "translation"),
-    ("airMoment.", "translation"),
-    ("prescribed.alpha", "translation"),
-    ("prescribed.beta", "translation"),
-    ("prescribed.sigma", "translation"),
-    ("prescribedRate.", "translation"),
-    ("trim.", "translation"),
-    ("air.altitude[", "vehicle.file"),
-    ("air.densityRatio[", "vehicle.file"),
-];
-
 /// Returns the description of the FMU.
 pub(crate) fn description() -> Description<ReentryPlant> {
     let scenario = Scenario::crmpc2022();
-    let table = VariableTable::new(|plant: &mut ReentryPlant| plant);
-    let table = PLACES.iter().fold(table, |table, (beginning, next)| table.before(beginning, next));
-    let table = table
-        .before("air.wind.", "vehicle.file")
+    let table = VariableTable::new(|plant: &mut ReentryPlant| plant)
         .change("attitudeRate.beta", |rate| {
             depend_on(rate, &["motion.*", "attitude.*", "trajectory.*", "rate.p", "rate.r"]);
         })

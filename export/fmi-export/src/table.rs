@@ -160,18 +160,6 @@ impl<M: 'static> VariableTable<M> {
         self
     }
 
-    /// Moves the variables whose names begin so before the first one whose name begins with `next`.
-    #[must_use]
-    pub fn before(mut self, beginning: &str, next: &str) -> Self {
-        let begins = |entry: &Entry<M>, with: &str| entry.variable.name.starts_with(with);
-        let moved = self.entries.extract_if(.., |entry| begins(entry, beginning));
-        let moved: Vec<Entry<M>> = moved.collect();
-        let place = self.entries.iter().position(|entry| begins(entry, next));
-        let place = place.unwrap_or(self.entries.len());
-        self.entries.splice(place..place, moved);
-        self
-    }
-
     /// Leaves out the variables whose names begin so.
     #[must_use]
     pub fn without(mut self, beginning: &str) -> Self {

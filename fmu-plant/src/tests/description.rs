@@ -10,8 +10,9 @@ fn the_description_holds() {
     let description = describe::<ReentryPlant>();
     description.check().unwrap();
     let motion = (0..6).map(|i| (i, i + 6));
-    let deflections = (27..35).map(|i| (i, i + 27));
-    let altitude = description.position("motion.altitude").unwrap();
+    let [deflection, rate, altitude] = ["deflection[1]", "deflectionRate[1]", "motion.altitude"]
+        .map(|name| description.position(name).unwrap());
+    let deflections = (0..8).map(|i| (deflection + i, rate + i));
     let travel = (altitude..altitude + 6).map(|i| (i, i + 6));
     let expected: Vec<_> = motion.chain(deflections).chain(travel).collect();
     assert_eq!(description.states(), expected);
