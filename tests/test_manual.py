@@ -1,4 +1,4 @@
-"""The manual as scripts/manual makes it: its chapters, links, search, formulas, reference and gallery."""
+"""The manual as scripts/manual makes it: its chapters, links, search, formulas, and reference."""
 
 import json
 import os
@@ -26,10 +26,6 @@ else:
 
 SITE = TARGET / "manual"
 CHAPTERS = tomllib.loads((ROOT / "docs" / "site" / "chapters.toml").read_text())["part"]
-# FMUs that command no moment. The gallery has them in experiments.
-NO_CONTROLLERS = {"ReentryPlant", "ControlAllocator", "AttitudeEstimator", "EntryGuidance", "EntryNavigation"}
-# Files beside experiments: studies, their values, and what other experiments extend.
-NO_EXPERIMENTS = {"study", "published", "computed", "any", "any-allocated"}
 can_build = pytest.mark.skipif(
     os.name == "nt" or sys.version_info < (3, 11) or not (shutil.which("node") and shutil.which("npm")),
     reason="the manual needs Python 3.11 or later, node and npm",
@@ -130,22 +126,6 @@ def test_the_reference_has_every_variable_and_every_key(site):
         tables = {kind: schema, **{f"{kind}.{name}": table for name, table in schema["definitions"].items()}}
         anchors = page(site / "reference" / f"{kind}-keys.html").anchors
         assert {f"{owner}.{key}" for owner, table in tables.items() for key in table.get("properties", {})} <= anchors
-
-
-@can_build
-def test_the_gallery_has_every_controller_and_every_experiment(site):
-    shown = {Path(address).stem for address in page(site / "reference" / "gallery.html").loaded}
-    experiments = {
-        f"{path.parent.name}-{path.stem}"
-        for path in (ROOT / "orchestrator" / "experiments").glob("*/*.toml")
-        if path.parent.name not in ("base", "campaigns") and path.stem not in NO_EXPERIMENTS
-    }
-    assert len(experiments) >= 32
-    expected = experiments | set(NAMES) - NO_CONTROLLERS
-    assert expected <= shown
-    for name in expected:
-        plot = (site / "_images" / f"{name}.svg").read_text(encoding="utf-8")
-        assert re.search(r"<(polyline|path)", plot), name
 
 
 def browse(address, profile, *options):

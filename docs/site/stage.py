@@ -1,7 +1,7 @@
 """Writes the pages of the manual that follow from other files: the variables of every FMU from the
 committed descriptions, the keys of experiments, studies and campaigns from their JSON Schemas, the
-items of the papers from docs/claims, where every setting acts, the API in Python and Rust, and the
-gallery. Nothing of it is committed.
+items of the papers from docs/claims, where every setting acts, and the API in Python and Rust.
+Nothing of it is committed.
 """
 
 import json
@@ -15,7 +15,6 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path += [str(ROOT / "scripts" / "pages")]
 
 import claims
-import gallery
 import parameters
 
 CAUSALITIES = {"input": "Inputs", "output": "Outputs", "parameter": "Parameters"}
@@ -167,25 +166,6 @@ def rust_api(folder, rust):
     write(folder / "rust-api.md", "\n".join(lines))
 
 
-def gallery_page(folder, pictures):
-    """Shows the plots of scripts/pages/gallery.py, which lie in the folder `pictures`."""
-    parts = [
-        "# Gallery\n\nEach plot is the `plot.svg` of a run with the experiment's own settings. "
-        "The command above it repeats the run.\n",
-        "## Every controller\n\nAll of them on the scenario of Chai 2022, with the moment acting as "
-        "commanded. The vehicle is in every picture; ControlAllocator is in the experiments with control "
-        "allocation, AttitudeEstimator in those with sensors, and EntryGuidance and EntryNavigation in the entry flights.\n",
-    ]
-    groups = {None: gallery.controllers(), **gallery.experiments()}
-    for group, members in groups.items():
-        parts += [f"## Experiments: {group}\n"] if group else []
-        for picture in members:
-            shutil.copy2(pictures / f"{picture.file}.svg", folder / f"{picture.file}.svg")
-            parts.append(f"### {picture.title}\n\n```sh\norchestrator run {' '.join(picture.arguments)}\n```\n")
-            parts.append(f"```{{image}} {picture.file}.svg\n:alt: Plot of the run: {picture.title}\n:loading: lazy\n```\n")
-    write(folder / "gallery.md", "\n".join(parts))
-
-
 def tracked(pattern):
     """Files of the repository by a pattern, without what is ignored."""
     command = ["git", "ls-files", "--cached", "--others", "--exclude-standard", pattern]
@@ -208,7 +188,7 @@ def pages(stage):
     write(stage / "README.md", re.sub(r"<picture>.*?src=\"(.*?)\"\s+alt=\"(.*?)\".*?</picture>", r"![\2](\1)", readme, flags=re.S))
 
 
-def main(stage, pictures, rust, table):
+def main(stage, rust, table):
     shutil.rmtree(stage, ignore_errors=True)
     pages(stage)
     folder = stage / "reference"
@@ -219,7 +199,6 @@ def main(stage, pictures, rust, table):
     settings(folder, table)
     python_api(folder)
     rust_api(folder, rust)
-    gallery_page(folder, pictures)
 
 
 if __name__ == "__main__":

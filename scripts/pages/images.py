@@ -1,17 +1,19 @@
 """Redraws the pictures of docs/images that are the program's own: images.py STUDIES
 
 STUDIES holds a folder for each study, as `orchestrator reproduce STUDY --out STUDIES/STUDY` writes it. The flights are
-flown here, with the program and the FMUs in target.
+flown here, with the program and the FMUs that scripts/build-fmus makes.
 """
 
+import os
 import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-from gallery import ROOT, TARGET, program
-
+ROOT = Path(__file__).resolve().parents[2]
+TARGET = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
+PROGRAM = TARGET / "release" / "orchestrator"
 IMAGES = ROOT / "docs" / "images"
 STUDIES = {
     "crmpc-2022-delays": "crmpc-2022/figures/delays",
@@ -27,7 +29,7 @@ FLIGHTS = {"crmpc-robust": "crmpc-robust", "entry": "from-120km"}
 
 
 def call(*arguments):
-    subprocess.run([program(), *arguments, "--fmu-dir", TARGET / "fmu"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([PROGRAM, *arguments, "--fmu-dir", TARGET / "fmu"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
 
 
 def main(studies: Path) -> None:
