@@ -29,7 +29,7 @@ pub(crate) struct Fly {
     #[arg(long, value_name = "EXPERIMENT")]
     experiment: Option<PathBuf>,
     /// Look for the worst case instead, as [search] of the campaign says, and write it as an
-    /// experiment and report.html with its curves over those of other cases.
+    /// experiment and report.html.
     #[arg(long, help_heading = "Search")]
     worst: bool,
     #[command(flatten)]

@@ -4,8 +4,7 @@ use crate::definition::kept_column;
 use crate::plan::Plan;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
-use cosim::run::Observer;
-use cosim::system::{Opened, System};
+use cosim::system::Opened;
 use cosim::variation::SettingValue;
 use serde::{Deserialize, Serialize};
 use sweep::flight::{Flown, columns};
@@ -13,7 +12,7 @@ use sweep::table::{CaseTable, Column, Values};
 
 /// How a case ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub enum CaseStatus {
+pub(crate) enum CaseStatus {
     /// It reached its stop time.
     Completed,
     /// An FMU ended it, which is not a fault.
@@ -26,10 +25,10 @@ pub enum CaseStatus {
 
 impl CaseStatus {
     /// Every status, in the order of their severity.
-    pub const ALL: [Self; 4] = [Self::Completed, Self::Ended, Self::Lost, Self::Failed];
+    pub(crate) const ALL: [Self; 4] = [Self::Completed, Self::Ended, Self::Lost, Self::Failed];
 
     /// Returns the name of the status in tables.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Completed => "completed",
             Self::Ended => "ended",
@@ -41,7 +40,7 @@ impl CaseStatus {
 
 /// Result of a case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Row {
+pub(crate) struct Row {
     /// Number of the case.
     pub case: u64,
     /// Values of the varied parameters.
@@ -59,7 +58,7 @@ pub struct Row {
 }
 
 /// Instances that fly one case after the other.
-pub struct Flight<'a> {
+pub(crate) struct Flight<'a> {
     plan: &'a Plan,
     instances: sweep::flight::Flight<'a>,
 }
@@ -69,42 +68,31 @@ impl<'a> Flight<'a> {
     ///
     /// # Errors
     /// Returns an error if an archive cannot be opened.
-    pub fn new(plan: &'a Plan, resets: bool, interrupt: &'a Interrupt) -> Result<Self, Error> {
+    pub(crate) fn new(
+        plan: &'a Plan,
+        resets: bool,
+        interrupt: &'a Interrupt,
+    ) -> Result<Self, Error> {
         let flight =
             sweep::flight::Flight::new(&plan.sweep, &mut Opened::default(), resets, interrupt)?;
         Ok(Self { plan, instances: flight.ending_when_lost() })
-    }
-
-    /// Leaves out the margins of cases, which are flown for their curves.
-    pub fn leave_out_margins(&mut self) {
-        self.instances.leave_out_margins();
-    }
-
-    /// Returns the system whose cases are flown. Signals that are probed now are seen by observers.
-    pub fn system(&mut self) -> &mut System {
-        self.instances.system()
     }
 
     /// Flies the case with this number.
     ///
     /// # Errors
     /// The errors are those of [`sweep::flight::Flight::fly`].
-    pub fn fly(&mut self, case: u64) -> Result<Row, Error> {
-        self.fly_with(case, self.plan.sweep.values(case), &mut [])
+    pub(crate) fn fly(&mut self, case: u64) -> Result<Row, Error> {
+        self.fly_with(case, self.plan.sweep.values(case))
     }
 
-    /// Flies a case with these values, seen by further observers.
+    /// Flies a case with these values.
     ///
     /// # Errors
     /// The errors are those of [`Self::fly`].
-    pub fn fly_with(
-        &mut self,
-        case: u64,
-        values: Vec<SettingValue>,
-        others: &mut [&mut dyn Observer],
-    ) -> Result<Row, Error> {
+    pub(crate) fn fly_with(&mut self, case: u64, values: Vec<SettingValue>) -> Result<Row, Error> {
         let Flown { case, values, metrics, outcome, without_margins, time } =
-            self.instances.fly_with(case, values, others)?;
+            self.instances.fly_with(case, values, &mut [])?;
         let outcome = outcome.and(without_margins.map_or(Ok(()), Err));
         let status = match &outcome {
             Ok(()) => CaseStatus::Completed,
@@ -126,7 +114,7 @@ impl<'a> Flight<'a> {
 }
 
 /// Makes a table of rows.
-pub fn table(plan: &Plan, rows: &[Row]) -> CaseTable {
+pub(crate) fn table(plan: &Plan, rows: &[Row]) -> CaseTable {
     let cases: Vec<_> = rows.iter().map(|row| (row.case, row.values.as_slice())).collect();
     let mut columns = columns(&plan.sweep, &cases);
     for (place, recorded) in plan.recorded.iter().enumerate() {

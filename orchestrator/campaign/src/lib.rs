@@ -1,17 +1,16 @@
 //! Campaigns: thousands of cases of one experiment, in which parameters vary.
 //!
 //! A campaign ([`definition`]) is a sweep with limits: it is prepared once ([`plan`]), and a
-//! [`flight`] flies its cases. Their parts are kept until all are merged ([`run`]). [`findings`] and
-//! [`sensitivity`] evaluate the cases, and [`report`] shows the results. [`search`] looks for the
+//! `flight` flies its cases. Their parts are kept until all are merged ([`run`]). [`findings`] and
+//! `sensitivity` evaluate the cases, and `report` shows the results. [`search`] looks for the
 //! worst case.
 
-mod cloud;
 pub mod definition;
 pub mod findings;
-pub mod flight;
+mod flight;
 pub mod plan;
-pub mod prepare;
-pub mod report;
+mod prepare;
+mod report;
 pub mod run;
 pub mod search;
-pub mod sensitivity;
+mod sensitivity;

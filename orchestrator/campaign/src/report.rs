@@ -3,7 +3,6 @@
 
 mod figures;
 
-use crate::cloud;
 use crate::findings::{Findings, LimitFinding, Measured, worst};
 use crate::plan::Plan;
 use crate::sensitivity::Sensitivity;
@@ -13,7 +12,6 @@ use cosim_report::figure::{Figure, with_unit};
 use cosim_report::page::{Page, Section, figure, paragraphs, table, verdict};
 use maud::{Markup, html};
 use std::path::Path;
-use sweep::runner::Options;
 use sweep::statistics::{Probability, Summary};
 use sweep::table::CaseTable;
 use sweep::texts::{percent, shown};
@@ -26,22 +24,17 @@ const SHOWN: usize = 5;
 /// Writes `report.html`.
 ///
 /// # Errors
-/// Returns an error if a file cannot be written, or if the work was asked to end.
-pub fn write(
+/// Returns an error if the file cannot be written.
+pub(crate) fn write(
     plan: &Plan,
     findings: &Findings,
     cases: &CaseTable,
     out: &Path,
-    options: &Options,
 ) -> Result<(), Error> {
     let ranked = ranking(plan).map(|name| (name, worst(&cases.numbers(name), SHOWN)));
     let histograms = figures::distributions(plan, cases);
     let mut pictures: Vec<Figure> = histograms.into_iter().collect();
     pictures.extend(figures::scatters(plan, cases));
-    if let Some(worst) = ranked.as_ref().and_then(|(_, cases)| cases.first()) {
-        let (name, values) = (format!("case {worst}"), plan.sweep.values(*worst));
-        pictures.extend(cloud::draw(plan, &name, (*worst, &values), findings.cases, options)?);
-    }
     let page = page(plan, findings, &pictures, ranked);
     files::write(&out.join("report.html"), page)
 }

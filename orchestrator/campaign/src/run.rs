@@ -133,7 +133,7 @@ pub fn fly(plan: &Plan, options: &Options) -> Result<CampaignReport, Error> {
     }
     check_values(plan, &table)?;
     files::write_json(&out.join("summary.json"), &findings)?;
-    report::write(plan, &findings, &table, &out, options)?;
+    report::write(plan, &findings, &table, &out)?;
     let (elapsed, notes) = (begin.elapsed().as_secs_f64(), std::mem::take(&mut work.notes));
     Ok(CampaignReport { findings, out: out.clone(), flown, elapsed, notes })
 }

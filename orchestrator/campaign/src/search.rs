@@ -136,7 +136,7 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
     let title = format!("{}, the worst case that a search found", plan.campaign.title);
     let text = plan.sweep.experiment_of(&title, &worst.row.values)?;
     files::write(&outcome.out.join("worst.toml"), text)?;
-    page::write(plan, &outcome, &tried, &worst.row, options)?;
+    page::write(plan, &outcome, &tried, &worst.row)?;
     files::write_json(&outcome.out.join("search.json"), &outcome)?;
     Ok(outcome)
 }
@@ -215,7 +215,7 @@ fn serve(plan: &Plan, interrupt: &Interrupt, waiting: &Mutex<Receiver<Order>>) {
                 None => Flight::new(plan, false, interrupt)?,
             };
             let values = plan.sweep.values_at(&order.point, CASE);
-            flight.insert(current).fly_with(CASE, values, &mut [])
+            flight.insert(current).fly_with(CASE, values)
         };
         // If the search no longer waits for the result, it is discarded.
         let _ = order.reply.send(fly());

@@ -16,7 +16,7 @@ pub struct Sensitivity {
 
 /// A parameter that varies, with its values in all cases.
 #[derive(Clone, Debug)]
-pub struct Input {
+pub(crate) struct Input {
     /// Name of the parameter.
     pub name: String,
     /// Whether its values are seeds.
@@ -27,7 +27,7 @@ pub struct Input {
 
 /// Computes the rank correlation of two samples, in which pairs with a value that is not a number
 /// are left out, and its p-value.
-pub fn rank_correlation(x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
+pub(crate) fn rank_correlation(x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
     let pairs = x.iter().zip(y).filter(|(x, y)| !x.is_nan() && !y.is_nan());
     let (x, y): (Vec<f64>, Vec<f64>) = pairs.map(|(x, y)| (*x, *y)).unzip();
     let value = correlation(&ranks(&x), &ranks(&y))?;
@@ -75,7 +75,7 @@ fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
 }
 
 /// Computes the sensitivities of a measure to all parameters that are no seeds.
-pub fn sensitivities(inputs: &[Input], measure: &[f64]) -> Vec<Sensitivity> {
+pub(crate) fn sensitivities(inputs: &[Input], measure: &[f64]) -> Vec<Sensitivity> {
     let sensitivity = |input: &Input| {
         let ranks = rank_correlation(&input.values, measure);
         Sensitivity {

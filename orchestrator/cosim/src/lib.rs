@@ -8,7 +8,7 @@
 //! finished run, and [`ssp`] reads and writes systems as SSP archives.
 
 pub mod check;
-pub mod closing;
+mod closing;
 pub mod document;
 pub mod error;
 pub mod experiment;

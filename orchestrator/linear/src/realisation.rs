@@ -10,12 +10,12 @@ use crate::Matrix;
 use crate::model::Step;
 
 /// Responses to changes at one step: one matrix, outputs by inputs, for each lag.
-pub type Lags = Vec<Matrix>;
+pub(crate) type Lags = Vec<Matrix>;
 
 /// Returns a model of each step of a period. `phases` are the responses to changes at each step.
 /// Before a step, the changes of the last `memory` steps count. States that add less than
 /// `tolerance` to the responses, relative to the largest, are left out.
-pub fn realise(phases: &[Lags], memory: usize, tolerance: f64) -> Vec<Step> {
+pub(crate) fn realise(phases: &[Lags], memory: usize, tolerance: f64) -> Vec<Step> {
     let period = phases.len();
     let (outputs, inputs) = phases[0][0].shape();
     let future = phases[0].len() - memory;

@@ -16,12 +16,12 @@ const SQUARINGS: i32 = 40;
 const SMALL: f64 = 1e-12;
 
 /// Returns the largest magnitude of an eigenvalue of a square matrix.
-pub fn spectral_radius<T: ComplexField<RealField = f64>>(a: &DMatrix<T>) -> f64 {
+pub(crate) fn spectral_radius<T: ComplexField<RealField = f64>>(a: &DMatrix<T>) -> f64 {
     dominant(a).norm()
 }
 
 /// Returns whether all eigenvalues lie within the unit circle. Far from it, few squarings decide.
-pub fn is_stable<T: ComplexField<RealField = f64>>(a: &DMatrix<T>) -> bool {
+pub(crate) fn is_stable<T: ComplexField<RealField = f64>>(a: &DMatrix<T>) -> bool {
     let (mut power, mut square) = (a.clone(), a.clone());
     // ln ‖Aᴺ‖ for N = 2ᵏ, and before.
     let (mut logarithm, mut before) = (0.0, 0.0);
@@ -50,7 +50,7 @@ pub fn is_stable<T: ComplexField<RealField = f64>>(a: &DMatrix<T>) -> bool {
 
 /// Returns an eigenvalue of the largest magnitude. As the power of a matrix grows, its columns come
 /// to lie in the span of the eigenvectors of a pair, which then is read off.
-pub fn dominant<T: ComplexField<RealField = f64>>(a: &DMatrix<T>) -> Complex<f64> {
+pub(crate) fn dominant<T: ComplexField<RealField = f64>>(a: &DMatrix<T>) -> Complex<f64> {
     let mut power = balanced(a.clone());
     let complex = power.map(|value| Complex::new(value.clone().real(), value.imaginary()));
     let mut square = power.clone();

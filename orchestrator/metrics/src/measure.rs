@@ -142,12 +142,6 @@ impl Gauge {
         is_count || self.quantity == Quantity::Last && is_integer
     }
 
-    /// Returns the single values of a percentile, in the order of time.
-    pub(crate) fn samples(&self) -> Vec<f64> {
-        let factor = self.measure.unit.as_ref().map_or(1.0, |unit| unit.factor);
-        self.seen.samples.iter().map(|sample| factor * sample).collect()
-    }
-
     fn see(&mut self, time: f64, values: &[f64]) {
         if self.measure.over.is_some_and(|[from, to]| !(from..=to).contains(&time)) {
             return;

@@ -325,16 +325,6 @@ impl Meters {
         (self.samples, self.completed) = (0, false);
     }
 
-    /// Returns the single values of the metrics that keep them, by name, in the order of time.
-    pub fn samples(&self) -> BTreeMap<String, Vec<f64>> {
-        let gauges =
-            self.gauges.iter().filter_map(|(name, gauge)| Some((name, gauge.as_ref()?.samples())));
-        gauges
-            .filter(|(_, samples)| !samples.is_empty())
-            .map(|(name, s)| (name.clone(), s))
-            .collect()
-    }
-
     /// Returns the number of communication points seen.
     pub fn seen(&self) -> u64 {
         self.samples

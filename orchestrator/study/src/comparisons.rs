@@ -5,10 +5,6 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
 
-fn paper() -> String {
-    "Paper".into()
-}
-
 /// A table that compares numbers of the paper with ours.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -18,9 +14,6 @@ pub struct ComparisonTable {
     /// Note that is shown with the table.
     #[serde(default)]
     pub note: String,
-    /// Heading of the column of numbers to compare with.
-    #[serde(default = "paper")]
-    pub against: String,
     /// Rows of the table, each with one quantity.
     #[serde(rename = "row")]
     pub rows: Vec<ComparisonRow>,

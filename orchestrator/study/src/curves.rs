@@ -24,8 +24,6 @@ pub struct Series {
     pub time: Vec<f64>,
     /// Values at these times, in the unit in which they are shown.
     pub signals: BTreeMap<Signal, Vec<f64>>,
-    /// Single values of the metrics that keep them, by name.
-    pub samples: BTreeMap<String, Vec<f64>>,
     /// Frequency responses of the loop, if a figure draws them.
     pub response: Option<ResponseCurves>,
 }

@@ -3,7 +3,7 @@
 use crate::comparisons::{Claim, ComparisonTable, Overview};
 use crate::drawings::{Figure, Panel};
 use crate::grid::Grid;
-use crate::runs::{Assumption, Fact, Run, Within};
+use crate::runs::{Assumption, Run, Within};
 use crate::values::{Quantity, Values};
 use cosim::document::Source;
 use cosim::error::Error;
@@ -32,9 +32,6 @@ pub struct Study {
     /// Abbreviations that the page uses, with their meaning.
     #[serde(default)]
     pub terms: BTreeMap<String, String>,
-    /// Lines of the table that describes the scenario.
-    #[serde(default, rename = "scenario")]
-    pub scenario: Vec<Fact>,
     /// Gaps in the paper, each with the assumption that fills it here.
     #[serde(default, rename = "assumption")]
     pub assumptions: Vec<Assumption>,

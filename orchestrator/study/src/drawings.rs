@@ -35,8 +35,8 @@ fn one() -> usize {
     1
 }
 
-/// A panel of a figure. Exactly one of `signal`, `signals`, `histogram`, `across` and `response`
-/// selects the curves; a panel may also have `points` alone.
+/// A panel of a figure. Exactly one of `signal`, `signals`, `across` and `response` selects
+/// the curves.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Panel {
@@ -60,9 +60,6 @@ pub struct Panel {
     /// Whether a band shows the range of the signal over all values of `vary`.
     #[serde(default)]
     pub spread: bool,
-    /// Metric of kind `p99` whose single values are shown as a histogram, with a logarithmic
-    /// horizontal axis.
-    pub histogram: Option<String>,
     /// Two metrics that are drawn against each other: as one dot for each case of the runs, or as
     /// lines through several runs.
     pub across: Option<Across>,
@@ -78,9 +75,6 @@ pub struct Panel {
     /// Vertical lines across the panel.
     #[serde(default)]
     pub marks: Vec<Line>,
-    /// Single points that are drawn in the panel.
-    #[serde(default)]
-    pub points: Vec<Point>,
     /// Unit of the values, in place of the display unit of the FMU.
     pub unit: Option<Scaled>,
     /// Range of the horizontal axis to show, from and to.
@@ -89,39 +83,33 @@ pub struct Panel {
     pub y_range: Option<[f64; 2]>,
 }
 
-/// Content of a panel besides its points and straight lines.
+/// Content of a panel besides its straight lines.
 #[derive(Clone, Copy, Debug)]
 pub enum Drawn<'a> {
     /// Signals over time.
     Signals,
-    /// The single values of a metric.
-    Histogram(&'a str),
     /// Two metrics against each other.
     Across(&'a Across),
     /// Frequency responses.
     Response(Response),
-    /// Nothing.
-    Points,
 }
 
 impl Panel {
     /// Returns the content of the panel.
     ///
     /// # Errors
-    /// Returns an error unless the panel has exactly one key that says so, or points alone.
+    /// Returns an error unless the panel has exactly one key that says so.
     pub fn drawn(&self) -> Result<Drawn<'_>, String> {
         let keys = [
             self.signal.as_ref().map(|_| Drawn::Signals),
             (!self.signals.is_empty()).then_some(Drawn::Signals),
-            self.histogram.as_deref().map(Drawn::Histogram),
             self.across.as_ref().map(Drawn::Across),
             self.response.map(Drawn::Response),
-            (!self.points.is_empty()).then_some(Drawn::Points),
         ];
         let mut given = keys.into_iter().flatten();
         match (given.next(), given.next()) {
-            (Some(drawn), None | Some(Drawn::Points)) => Ok(drawn),
-            _ => Err("a panel needs exactly one of signal, signals, histogram, across and response, or points alone".into()),
+            (Some(drawn), None) => Ok(drawn),
+            _ => Err("a panel needs exactly one of signal, signals, across and response".into()),
         }
     }
 
@@ -206,18 +194,4 @@ pub struct Line {
     /// Whether a second line is drawn at the negative position.
     #[serde(default)]
     pub symmetric: bool,
-}
-
-/// A single point that is drawn in a panel.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Point {
-    /// Position along the horizontal axis: a number, or the id of a value.
-    pub x: Quantity,
-    /// Position along the vertical axis: a number, or the id of a value.
-    pub y: Quantity,
-    /// Name of the point in the legend.
-    pub label: String,
-    /// Colour of the point.
-    pub color: Color,
 }

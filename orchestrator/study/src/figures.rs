@@ -1,16 +1,12 @@
 //! Draws the figures of a study from the results of its runs.
 
-use crate::drawings::{Across, Axis, Drawn, Figure, Line, Panel, Point, Response, Through};
+use crate::drawings::{Across, Axis, Drawn, Figure, Line, Panel, Response, Through};
 use crate::results::{Results, RunResult};
 use crate::runs::Run;
-use crate::values::Quantity;
 use cosim::signal::Signal;
 use cosim_report::figure::{self, Color, Curve, Shape};
 use linear::curves::{ResponseCurves, excluded};
 use toml::Spanned;
-
-/// Number of columns of a histogram for each decade.
-const COLUMNS_PER_DECADE: f64 = 12.0;
 
 /// A run whose curves a panel shows, with its results.
 type Shown<'a> = (&'a Run, &'a RunResult);
@@ -32,20 +28,17 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
     let drawn = panel.drawn()?;
     let (x_label, mut curves) = match drawn {
         Drawn::Signals => ("time, s", over_time(panel, &runs)),
-        Drawn::Histogram(metric) => (metric, histograms(metric, &runs)),
         Drawn::Across(across) if across.lines.is_empty() => {
             (across.x.metric.as_str(), scattered(across, &runs, results)?)
         }
         Drawn::Across(across) => (across.x.metric.as_str(), lines_across(across, results)?),
         Drawn::Response(Response::Nichols) => ("phase of L, deg", nichols(panel.disk, &runs)),
         Drawn::Response(Response::Sensitivity) => ("frequency, rad/s", sensitivities(&runs)),
-        Drawn::Points => ("time, s", Vec::new()),
     };
-    curves.extend(points(panel, results)?);
     curves.extend(straight_lines(panel, results)?);
     Ok(figure::Panel {
         title: panel.title.clone(),
-        log_x: matches!(drawn, Drawn::Histogram(_) | Drawn::Response(Response::Sensitivity)),
+        log_x: matches!(drawn, Drawn::Response(Response::Sensitivity)),
         x_range: panel.x_range,
         y_range: panel.y_range,
         ..figure::Panel::new(panel.x_label.as_deref().unwrap_or(x_label), &panel.label, curves)
@@ -150,14 +143,6 @@ fn sensitivities(runs: &[Shown]) -> Vec<Curve> {
     responses(runs, |curves| (&curves.frequency, &curves.sensitivity))
 }
 
-fn points(panel: &Panel, results: &Results) -> Result<Vec<Curve>, String> {
-    let at = |quantity: &Quantity| results.study.values.number(quantity).map(|number| vec![number]);
-    let cross = |point: &Point| {
-        Ok(Curve::new(&point.label, point.color, Shape::Crosses, at(&point.x)?, at(&point.y)?))
-    };
-    panel.points.iter().map(cross).collect()
-}
-
 /// Draws the straight lines of a panel: its bounds, and then its marks.
 fn straight_lines(panel: &Panel, results: &Results) -> Result<Vec<Curve>, String> {
     let mut curves = Vec::new();
@@ -176,32 +161,4 @@ fn straight_lines(panel: &Panel, results: &Results) -> Result<Vec<Curve>, String
         draw(line, &Shape::Vertical, |x| (x, f64::NAN))?;
     }
     Ok(curves)
-}
-
-/// Draws the durations of each run as a histogram: shares, in per cent, in columns of equal width
-/// on a logarithmic axis.
-fn histograms(metric: &str, runs: &[Shown]) -> Vec<Curve> {
-    let histogram = |(run, result): &Shown| {
-        let (x, y) = columns(result.series.samples.get(metric)?);
-        Some(of_run(run, Shape::Steps, x, y))
-    };
-    runs.iter().filter_map(histogram).collect()
-}
-
-fn columns(durations: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let column = |value: f64| (value.log10() * COLUMNS_PER_DECADE).floor();
-    let timed: Vec<f64> =
-        durations.iter().copied().filter(|value| *value > 0.0).map(column).collect();
-    let first = timed.iter().copied().fold(f64::INFINITY, f64::min);
-    let last = timed.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let (mut x, mut y) = (Vec::new(), Vec::new());
-    let mut edge = first;
-    // A further, empty column ends the last one.
-    while edge <= last + 1.0 {
-        x.push(10_f64.powf(edge / COLUMNS_PER_DECADE));
-        let inside = timed.iter().filter(|column| **column == edge).count();
-        y.push(100.0 * inside as f64 / timed.len() as f64);
-        edge += 1.0;
-    }
-    (x, y)
 }

@@ -181,9 +181,8 @@ impl Study {
         if panel.disk.is_some_and(|alpha| !(alpha > 0.0 && alpha < 2.0)) {
             return Err("disk must lie between 0 and 2".into());
         }
-        let lines = panel.bounds.iter().chain(&panel.marks).map(|line| &line.at);
-        let points = panel.points.iter().flat_map(|point| [&point.x, &point.y]);
-        lines.chain(points).try_for_each(|quantity| self.values.number(quantity).map(drop))
+        let mut lines = panel.bounds.iter().chain(&panel.marks);
+        lines.try_for_each(|line| self.values.number(&line.at).map(drop))
     }
 }
 

@@ -75,7 +75,6 @@ fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
             "set": run.set,
             "unset": run.unset,
             "members": members(result),
-            "samples": result.series.samples,
         });
         (run.id.get_ref().clone(), entry)
     };

@@ -58,9 +58,6 @@ pub(crate) fn page(
             Section::new("about", "Compared quantities", about),
             Section::new("figures", "Figures", figures(results, drawn)),
             Section::new("tables", "Numbers", tables),
-            Section::new("scenario", "Scenario", scenario(study))
-                .headed("Scenario of the paper, as it is printed")
-                .folded(),
             Section::new("assumptions", "Assumptions", assumed(study))
                 .headed("Assumptions where the paper is incomplete or in error")
                 .folded(),
@@ -202,24 +199,12 @@ fn figures(results: &Results, drawn: &[figure::Figure]) -> Markup {
     }
 }
 
-fn scenario(study: &Study) -> Markup {
-    let facts = study.scenario.iter().map(|fact| [&fact.what, &fact.value, &fact.source]);
-    texts(&["Quantity", "Value", "Source"], facts)
-}
-
+/// Returns a table of the assumptions, or nothing if there are none.
 fn assumed(study: &Study) -> Markup {
-    let assumed = study.assumptions.iter().map(|assumed| [&assumed.silent, &assumed.taken]);
-    texts(&["Gap or error in the paper", "Assumption made here"], assumed)
-}
-
-/// Returns a table of texts, or nothing if it has no rows.
-fn texts<'a, const N: usize>(
-    headings: &[&str; N],
-    rows: impl ExactSizeIterator<Item = [&'a String; N]>,
-) -> Markup {
-    let has_rows = rows.len() > 0;
-    let rows = rows.map(|row| row.map(|text| html! { (text) }).to_vec());
-    html! { @if has_rows { (table(headings, rows)) } }
+    let rows = study.assumptions.iter();
+    let rows = rows.map(|assumed| vec![html! { (assumed.silent) }, html! { (assumed.taken) }]);
+    let headings = ["Gap or error in the paper", "Assumption made here"];
+    html! { @if !study.assumptions.is_empty() { (table(&headings, rows)) } }
 }
 
 /// Returns where the numbers come from.

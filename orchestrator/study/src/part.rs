@@ -14,7 +14,7 @@ use cosim::system::Opened;
 use cosim_metrics::metrics::{Meters, Metrics, Value};
 use linear::curves::ResponseCurves;
 use serde_json::json;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::PathBuf;
 use sweep::cases::Sweep;
@@ -221,17 +221,12 @@ impl Instances<'_> {
         let mut cases = Vec::new();
         for case in range.clone() {
             let mut flown = self.one(case)?;
-            let mut samples = self.flight.samples();
             if self.preparation.is_timed(range) {
                 // Computing times are only meaningful if the run has the machine for itself, and
                 // interruptions can only lengthen them.
                 for _ in 1..REPETITIONS {
                     let again = self.one(case)?.metrics;
                     keep_least_times(&mut flown.metrics, &again, &sweep.experiment().observe);
-                    for (name, times) in self.flight.samples() {
-                        let least = samples.entry(name).or_default();
-                        least.iter_mut().zip(times).for_each(|(time, o)| *time = time.min(o));
-                    }
                 }
             }
             let signals = drawn.series.iter().zip(&self.track.values);
@@ -239,10 +234,9 @@ impl Instances<'_> {
             widen(&mut curves.spread, bands(spread));
             if case == 0 {
                 curves.parameters = self.flight.parameters()?;
-                samples.retain(|name, _| !name.starts_with("measure."));
                 let response = self.flight.linearised().filter(|_| drawn.response);
                 let response = response.and_then(ResponseCurves::of);
-                curves.series = Some(Series { response, ..self.series(samples) });
+                curves.series = Some(self.series(response));
             }
             cases.push(flown);
         }
@@ -251,14 +245,13 @@ impl Instances<'_> {
         Ok(PartResult { rows: table(sweep, &cases), curves })
     }
 
-    /// Returns the time series of the last case, to which the single values of metrics are added.
-    fn series(&self, samples: BTreeMap<String, Vec<f64>>) -> Series {
+    /// Returns the time series of the last case, to which its frequency responses are added.
+    fn series(&self, response: Option<ResponseCurves>) -> Series {
         let signals = self.preparation.drawn.series.iter().cloned();
         Series {
             time: self.track.time.clone(),
             signals: signals.zip(self.track.values.iter().cloned()).collect(),
-            samples,
-            response: None,
+            response,
         }
     }
 

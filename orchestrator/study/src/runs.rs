@@ -1,4 +1,4 @@
-//! The part of a study that describes its scenario and its runs.
+//! The part of a study that describes its runs.
 
 use crate::values::Quantity;
 use cosim::error::Error as Single;
@@ -11,19 +11,6 @@ use std::path::PathBuf;
 use sweep::error::Error;
 use sweep::vary::{DesignKind, Variation, Vary};
 use toml::{Spanned, Value};
-
-/// A line of the table that describes the scenario.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Fact {
-    /// Label of this scenario line, which names the quantity.
-    pub what: String,
-    /// Value of the quantity, with its unit.
-    pub value: String,
-    /// Source of the value, such as a page of the paper.
-    #[serde(default)]
-    pub source: String,
-}
 
 /// A gap in the paper, and the assumption that fills it here.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]

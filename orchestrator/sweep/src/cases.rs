@@ -20,7 +20,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Version of the files of parts, which must be raised when their content changes.
-const FORMAT: u32 = 5;
+const FORMAT: u32 = 6;
 
 /// Cases of one experiment that differ in the values of parameters, ready to be flown.
 pub struct Sweep {

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 /// Returns what a closed process of all these systems may use; `None` if none of them is closed.
-pub fn closing(systems: &[System]) -> Option<Closing> {
+pub(crate) fn closing(systems: &[System]) -> Option<Closing> {
     systems.iter().filter_map(System::closing).reduce(|mut all, other| {
         all.folders.extend(other.folders);
         all.files.extend(other.files);
@@ -22,7 +22,7 @@ pub fn closing(systems: &[System]) -> Option<Closing> {
 /// for. Results are `kept` in this one. If an instance ends or stops the closed process, the part
 /// fails, and another process works on what is left.
 #[expect(clippy::too_many_arguments, reason = "each is part of what a part goes through")]
-pub fn on_parts<P: Sync, S, R, K: Send, E>(
+pub(crate) fn on_parts<P: Sync, S, R, K: Send, E>(
     parts: &[P],
     mut count: usize,
     (closing, interrupt): (Option<&Closing>, &Interrupt),

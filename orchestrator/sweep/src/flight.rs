@@ -14,7 +14,6 @@ use fmu_import::fmu::Fmu;
 use fmu_import::law;
 use linear::linearise::{Linearised, Lineariser};
 use linear::measures::{self, Measured};
-use std::collections::BTreeMap;
 
 /// Result of a case.
 #[derive(Debug)]
@@ -94,11 +93,6 @@ impl<'a> Flight<'a> {
         self.times = true;
     }
 
-    /// Leaves out the margins of cases.
-    pub fn leave_out_margins(&mut self) {
-        self.lineariser = None;
-    }
-
     /// Returns the system whose cases are flown. Signals that are probed now are seen by observers.
     pub fn system(&mut self) -> &mut System {
         &mut self.system
@@ -113,11 +107,6 @@ impl<'a> Flight<'a> {
             Some(run) => self.system.parameters(run),
             None => Ok(Parameters::default()),
         }
-    }
-
-    /// Returns the single values of the metrics that keep them in the last case, by name.
-    pub fn samples(&self) -> BTreeMap<String, Vec<f64>> {
-        self.meters.samples()
     }
 
     /// Returns the loop of the last case, linearised as the experiment asks.

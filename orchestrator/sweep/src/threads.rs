@@ -7,7 +7,7 @@ use std::thread;
 
 /// Results of the parts, by their position.
 #[derive(Debug)]
-pub struct Worked<R, E> {
+pub(crate) struct Worked<R, E> {
     /// Results of the parts that are finished.
     pub results: BTreeMap<usize, R>,
     /// Errors of the parts that failed.
@@ -17,7 +17,7 @@ pub struct Worked<R, E> {
 /// Works on parts in their order. Each thread begins with a state of its own, because instances
 /// stay in the thread that made them. After a failure that does not `go_on` no further part is
 /// begun; parts that other threads are working on are finished.
-pub fn on_parts<P: Sync, S, R: Send, E: Send>(
+pub(crate) fn on_parts<P: Sync, S, R: Send, E: Send>(
     parts: &[P],
     threads: usize,
     begin: impl Fn() -> Result<S, E> + Sync,

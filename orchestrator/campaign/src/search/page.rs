@@ -1,43 +1,32 @@
 //! The page of a search: the worst case against its limits, how it was found, and how to fly it.
 
-use super::{CASE, SearchOutcome, Tried};
-use crate::cloud;
+use super::{SearchOutcome, Tried};
 use crate::flight::Row;
 use crate::plan::Plan;
 use cosim::error::Error;
 use cosim::experiment::name_of;
 use cosim::files;
-use cosim::interrupt::Interrupt;
 use cosim::variation::SettingValue;
 use cosim_report::figure::{Color, Curve, Figure, Panel, Shape, svg, with_unit};
 use cosim_report::page::{Page, Section, figure, table, verdict};
 use maud::{Markup, html};
 use std::path::Path;
-use sweep::runner::Options;
 use sweep::texts::shown;
 
-/// Writes `history.svg` and `report.html`, for which the worst case is flown again.
+/// Writes `history.svg` and `report.html`.
 ///
 /// # Errors
-/// Returns an error if the worst case cannot be flown, or if a file cannot be written.
+/// Returns an error if a file cannot be written.
 pub(super) fn write(
     plan: &Plan,
     outcome: &SearchOutcome,
     tried: &[Tried],
     worst: &Row,
-    options: &Options,
 ) -> Result<(), Error> {
     let out = &outcome.out;
     let history = history(plan, outcome, tried);
     svg::write(&history, &out.join("history.svg"))?;
-    // An interrupt of the search must not end these flights.
-    let options = Options { interrupt: Interrupt::default(), ..options.clone() };
-    let drawn =
-        cloud::draw(plan, "worst case", (CASE, &worst.values), plan.sweep.cases(), &options)?;
-    let figures = html! {
-        @if let Some(drawn) = &drawn { (figure(drawn, &html! {})) }
-        (figure(&history, &caption(outcome)))
-    };
+    let figures = figure(&history, &caption(outcome));
     let answer = html! {
         (answer(plan, outcome))
         p { "Fly it again, with everything recorded and a page of it:" }

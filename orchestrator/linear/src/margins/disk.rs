@@ -53,7 +53,7 @@ impl Disk {
 }
 
 /// The sensitivity S = (I + L)⁻¹ of a loop at many frequencies.
-pub struct Responses<'a> {
+pub(crate) struct Responses<'a> {
     open: &'a OpenLoop,
     /// Frequencies in rad/s, ascending, with the sensitivities there.
     known: Vec<(f64, ComplexMatrix)>,
@@ -61,7 +61,7 @@ pub struct Responses<'a> {
 
 impl<'a> Responses<'a> {
     /// Computes the sensitivities of a stable loop.
-    pub fn of(open: &'a OpenLoop) -> Self {
+    pub(crate) fn of(open: &'a OpenLoop) -> Self {
         let largest = PI / open.period;
         let mut frequencies: Vec<f64> = (0..=FREQUENCIES)
             .map(|k| largest * RANGE.powf(1.0 - k as f64 / FREQUENCIES as f64))
@@ -77,7 +77,7 @@ impl<'a> Responses<'a> {
     }
 
     /// Returns the disk margin of some signals, while the loops of the others stay closed.
-    pub fn disk(&self, channels: &[usize]) -> Disk {
+    pub(crate) fn disk(&self, channels: &[usize]) -> Disk {
         let shifted = |mut s: ComplexMatrix| {
             for i in 0..s.nrows() {
                 s[(i, i)] -= 0.5;
@@ -90,7 +90,7 @@ impl<'a> Responses<'a> {
 
     /// Returns the largest singular value of the sensitivity of some signals, in ascending order,
     /// each in its typical magnitude.
-    pub fn sensitivity(&self, channels: &[usize]) -> Peak {
+    pub(crate) fn sensitivity(&self, channels: &[usize]) -> Peak {
         let value = |s| largest_gain(self.open, channels, s);
         self.peak(channels, &value, &value)
     }
@@ -154,7 +154,7 @@ pub(crate) fn largest_gain(open: &OpenLoop, channels: &[usize], mut s: ComplexMa
 /// Returns the sensitivity S = (I − G)⁻¹ of the open loop G = −L at a frequency (rad/s), with the
 /// parts at all frequencies that the period mixes. It is computed from the closed loop, whose
 /// poles are not on the unit circle: w = E (C x + d) and x⁺ = A x + B w with E = (I − D)⁻¹.
-pub fn sensitivity(open: &OpenLoop, frequency: f64) -> ComplexMatrix {
+pub(crate) fn sensitivity(open: &OpenLoop, frequency: f64) -> ComplexMatrix {
     let Step { a, b, c, d } = &open.step;
     let n = d.nrows();
     let infinite = || ComplexMatrix::from_element(n, n, Complex::new(f64::INFINITY, 0.0));

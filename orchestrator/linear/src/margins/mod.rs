@@ -2,8 +2,8 @@
 //! it is sampled.
 
 mod classical;
-pub mod disk;
-pub mod structured;
+pub(crate) mod disk;
+pub(crate) mod structured;
 
 pub(crate) use classical::rate;
 pub use classical::{Classical, Crossing};

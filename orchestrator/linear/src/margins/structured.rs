@@ -9,7 +9,7 @@
 use nalgebra::{Complex, ComplexField, DMatrix, Matrix2, Matrix3};
 
 /// A complex matrix.
-pub type ComplexMatrix = DMatrix<Complex<f64>>;
+pub(crate) type ComplexMatrix = DMatrix<Complex<f64>>;
 
 /// Range of log D around the balanced matrix.
 const RANGE: f64 = 3.0;
@@ -17,7 +17,7 @@ const RANGE: f64 = 3.0;
 const SMALL: f64 = 1e-10;
 
 /// Returns the largest singular value of a matrix.
-pub fn largest_singular_value(matrix: &ComplexMatrix) -> f64 {
+pub(crate) fn largest_singular_value(matrix: &ComplexMatrix) -> f64 {
     let n = matrix.nrows();
     match n {
         0 => 0.0,
@@ -43,7 +43,7 @@ fn scaled_singular_value(matrix: &ComplexMatrix, d: [f64; 3]) -> f64 {
 
 /// Scales a matrix to D M D⁻¹ in which each row is as large as its column (E. E. Osborne, Journal
 /// of the ACM 7, 1960). Its largest singular value is an upper bound, and often a close one.
-pub fn balanced<T: ComplexField<RealField = f64>>(mut matrix: DMatrix<T>) -> DMatrix<T> {
+pub(crate) fn balanced<T: ComplexField<RealField = f64>>(mut matrix: DMatrix<T>) -> DMatrix<T> {
     let n = matrix.nrows();
     for _ in 0..10 {
         for i in 0..n {
@@ -69,7 +69,7 @@ fn scale<T: ComplexField<RealField = f64>>(matrix: &mut DMatrix<T>, i: usize, fa
 
 /// Returns an upper bound of the structured singular value: the least σ̄(D M D⁻¹) for up to three
 /// numbers, and that of the balanced matrix for more.
-pub fn upper_bound(matrix: &ComplexMatrix) -> f64 {
+pub(crate) fn upper_bound(matrix: &ComplexMatrix) -> f64 {
     let matrix = balanced(matrix.clone());
     // One number of D is free; all others follow one inside the other.
     let with = |x: f64, y: f64| scaled_singular_value(&matrix, [1.0, x.exp(), y.exp()]);
@@ -84,7 +84,7 @@ pub fn upper_bound(matrix: &ComplexMatrix) -> f64 {
 /// through the best three points, or golden sections where they do not get nearer: R. Brent,
 /// "Algorithms for minimization without derivatives" (1973), chapter 5. Returns its place and the
 /// value.
-pub fn least(function: &mut dyn FnMut(f64) -> f64, range: f64) -> (f64, f64) {
+pub(crate) fn least(function: &mut dyn FnMut(f64) -> f64, range: f64) -> (f64, f64) {
     let tolerance = 2.5e-9 * range;
     let share = 0.5 * (3.0 - 5.0_f64.sqrt());
     let (mut low, mut high) = (-range, range);

@@ -13,11 +13,11 @@ const PATTERNS: [&[f64]; 6] = [
 ];
 
 /// Patterns of the lines of panels. A name has the same pattern in each.
-pub struct Dashes<'a>(Vec<&'a str>);
+pub(super) struct Dashes<'a>(Vec<&'a str>);
 
 impl<'a> Dashes<'a> {
     /// Assigns a pattern to the name of every line of panels that share a legend.
-    pub fn new(panels: &'a [Panel]) -> Self {
+    pub(super) fn new(panels: &'a [Panel]) -> Self {
         let mut names: Vec<&str> = Vec::new();
         let curves = panels.iter().flat_map(|panel| &panel.curves);
         for curve in curves.filter(|curve| matches!(curve.shape, Shape::Line | Shape::Thin)) {
@@ -29,7 +29,7 @@ impl<'a> Dashes<'a> {
     }
 
     /// Returns strokes and gaps of a curve, px; nothing for a solid line.
-    pub fn of(&self, curve: &Curve) -> &'static [f64] {
+    pub(super) fn of(&self, curve: &Curve) -> &'static [f64] {
         match curve.shape {
             Shape::Dashed | Shape::Horizontal | Shape::Vertical => &[6.0, 4.0],
             Shape::Line | Shape::Thin => {

@@ -1,7 +1,7 @@
 //! A figure of panels with curves. It is drawn as SVG ([`svg`]) for papers and pages.
 
 pub(crate) mod clip;
-pub mod dash;
+mod dash;
 pub mod svg;
 mod thin;
 mod ticks;

@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 use std::iter;
 
 /// Returns the data that the scripts of a page draw.
-pub fn page(runs: &[Recording], panels: &[Panel], vehicles: &[usize]) -> Value {
+pub(super) fn page(runs: &[Recording], panels: &[Panel], vehicles: &[usize]) -> Value {
     let run = |(place, run): (usize, &Recording)| {
         let is_shown = vehicles.contains(&place);
         json!({
@@ -65,7 +65,7 @@ fn flight(run: &Recording) -> Option<Value> {
 }
 
 /// Returns whether the attitude of a vehicle is recorded.
-pub fn has_vehicle(run: &Recording) -> bool {
+pub(super) fn has_vehicle(run: &Recording) -> bool {
     let named = run.observe.vehicle.as_ref();
     named.is_some_and(|vehicle| vehicle.attitude.iter().all(|path| run.tracks.contains_key(path)))
         && !run.time.is_empty()

@@ -1,10 +1,10 @@
 //! The page of a run, or of several: curves with a common cursor, the vehicle in motion, the
 //! summary and the parameters. One file without a network.
 
-pub mod data;
+mod data;
 pub mod figure;
 mod numbers;
-pub mod plans;
+mod plans;
 pub(crate) mod thin;
 
 use crate::figure::{Figure, Legend, svg};

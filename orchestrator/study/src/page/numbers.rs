@@ -26,7 +26,7 @@ pub(super) fn small(full: &Overview, results: &Results) -> Markup {
 }
 
 pub(crate) fn comparison(compared: &ComparisonTable, results: &Results) -> Result<Markup, String> {
-    let headings = ["Quantity", &compared.against, "Ours", "Difference", "Remark"];
+    let headings = ["Quantity", "To compare", "Ours", "Difference", "Remark"];
     let rows = compared.rows.iter().map(|compared| row(compared, results));
     let rows = rows.collect::<Result<Vec<_>, _>>()?;
     Ok(html! {
