@@ -136,10 +136,10 @@ fn oracle_a_converted_moment_acts_as_the_rounded_one_does() {
     let delayed_config = Config { moment_delay: 0.05, ..config() };
     let delayed_converted_config = Config { moment_delay: 0.05, ..converted_config.clone() };
     for (with, without) in
-        [(converted_config, config()), (delayed_converted_config, delayed_config)]
+        [(&converted_config, &config()), (&delayed_converted_config, &delayed_config)]
     {
         let [mut converted, mut rounded] =
-            [&with, &without].map(|config| Plant::new(config, 0.0).unwrap());
+            [with, without].map(|config| Plant::new(config, 0.0).unwrap());
         for k in 0..50 {
             let (from, to) = (0.04 * f64::from(k), 0.04 * f64::from(k + 1));
             converted.advance(from, to, moment(k)).unwrap();
