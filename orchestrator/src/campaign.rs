@@ -13,6 +13,7 @@ use cosim::error::Error;
 use cosim::experiment::{Overrides, name_of};
 use cosim::interrupt::Interrupt;
 use cosim::search::named::{Kind, find};
+use cosim_metrics::progress;
 use fmu_import::law;
 use std::env;
 use std::io::Write;
@@ -159,12 +160,12 @@ fn fly_case(
 
 fn summary(report: &flights::CampaignReport, out: &mut impl Write) -> std::io::Result<()> {
     let Findings { title, cases, status, limits, measures } = &report.findings;
-    let rate = report.flown as f64 / report.elapsed;
+    let rate = progress::rate(report.flown as f64 / report.elapsed);
     writeln!(out, "{title}")?;
     let several = if *cases == 1 { "case" } else { "cases" };
     writeln!(
         out,
-        "  {cases} {several}, {} flown now in {:.1} s ({rate:.0} per second)",
+        "  {cases} {several}, {} flown now in {:.1} s ({rate})",
         report.flown, report.elapsed
     )?;
     for note in &report.notes {

@@ -32,7 +32,7 @@ fn bar(length: u64, quiet: bool, template: &str) -> ProgressBar {
 
 /// Formats the number of parts per second, or per minute if they are slow, with one digit after the
 /// point if it is small.
-fn rate(per_second: f64) -> String {
+pub fn rate(per_second: f64) -> String {
     let (rate, unit) =
         if per_second < 1.0 { (60.0 * per_second, "minute") } else { (per_second, "second") };
     let digits = usize::from(rate < 9.95);
