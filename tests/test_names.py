@@ -39,7 +39,7 @@ MEANT_TO_WARN = {
 
 def test_no_experiment_warns_about_itself(tmp_path):
     experiments = {row["name"]: row["path"] for row in listed() if row["kind"] == "experiment"}
-    assert len(experiments) == 39
+    assert len(experiments) == 41
     for index, (name, path) in enumerate(experiments.items()):
         # A study may have the same name, which `show` prefers.
         step = tomllib.loads(call("show", path).stdout)["simulation"]["step"]
