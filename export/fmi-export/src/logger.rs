@@ -189,39 +189,11 @@ fn to_c(text: &str) -> CString {
 mod tests {
     use super::*;
 
-    fn silent(on: bool) -> Logger {
-        Logger::new(None, CString::default(), on)
-    }
-
-    fn hears(logger: &Logger, category: Category) -> bool {
-        logger.active & (1 << category as u8) != 0
-    }
-
     #[test]
     fn rows_are_in_the_order_of_the_declared_categories() {
         for (i, category) in Category::ROWS.into_iter().enumerate() {
             assert_eq!(category as usize, i);
         }
-    }
-
-    #[test]
-    fn reasons_of_failures_are_heard_even_if_logging_is_off() {
-        let logger = silent(false);
-        assert!(hears(&logger, Category::Error) && hears(&logger, Category::Fatal));
-        assert!(hears(&logger, Category::Discard));
-        assert!(!hears(&logger, Category::Warning) && !hears(&logger, Category::Events));
-    }
-
-    #[test]
-    fn only_chosen_categories_are_heard() {
-        let mut logger = silent(true);
-        assert_eq!(logger.choose(true, &["logStatusWarning"]), None);
-        assert!(hears(&logger, Category::Warning) && !hears(&logger, Category::Events));
-        assert_eq!(logger.choose(true, &["logAll"]), None);
-        assert!(hears(&logger, Category::Events));
-        assert_eq!(logger.choose(false, &["logEvents"]), None);
-        assert!(hears(&logger, Category::Warning) && !hears(&logger, Category::Events));
-        assert_eq!(logger.choose(true, &["logWeather"]), Some("logWeather"));
     }
 
     #[test]

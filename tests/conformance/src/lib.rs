@@ -21,6 +21,7 @@ mod values;
 pub use fmu::{Fmu, fmu, fmus, fmus_and_interfaces, is_continuous_real, library};
 pub use instance::Instance;
 pub use log::{Log, Message, callbacks};
+pub use runs::driver;
 pub use values::Bits;
 
 /// Calls a function of the library to which an instance or FMU belongs:

@@ -1,7 +1,14 @@
 //! Runs of an instance with an input that moves.
 
-use crate::interface::EventInfo;
+use crate::interface::{EventInfo, MODEL_EXCHANGE};
 use crate::{Bits, Instance, ok};
+use std::ffi::c_int;
+use std::ops::Range;
+
+/// Returns the function that runs an instance of this interface.
+pub fn driver(fmu_type: c_int) -> fn(&Instance, Range<u32>) -> Vec<Bits> {
+    if fmu_type == MODEL_EXCHANGE { Instance::integrate } else { Instance::drive }
+}
 
 impl Instance {
     /// Value of the input at a tick of [`Instance::drive`]: small, and different at every tick.
@@ -13,7 +20,7 @@ impl Instance {
 
     /// Runs co-simulation with the proposed step over `ticks` and a moving input. Returns the
     /// results at each tick, read after the inputs of this tick were set.
-    pub fn drive(&self, ticks: std::ops::Range<u32>) -> Vec<Bits> {
+    pub fn drive(&self, ticks: Range<u32>) -> Vec<Bits> {
         let h = self.fmu.description.default_experiment.step;
         let (input, results) = (self.fmu.input(), self.fmu.results());
         let mut rows = vec![];
@@ -27,7 +34,7 @@ impl Instance {
 
     /// Runs model exchange with Euler steps of the proposed length, each from event mode to event
     /// mode. Returns the results at each tick.
-    pub fn integrate(&self, ticks: std::ops::Range<u32>) -> Vec<Bits> {
+    pub fn integrate(&self, ticks: Range<u32>) -> Vec<Bits> {
         let h = self.fmu.description.default_experiment.step;
         let n = self.fmu.description.states().len();
         let (mut x, mut derivatives) = (vec![0.0; n], vec![0.0; n]);

@@ -4,7 +4,7 @@
 use crate::interface::{DISCARD, ERROR, EventInfo, FmuState, MODEL_EXCHANGE, OK, Status};
 use crate::{Fmu, Instance, c, ok};
 use model_description::ModelDescription;
-use model_description::variable::{Causality, Variable, VariableKind};
+use model_description::variable::{Causality, VariableKind};
 use std::ffi::c_int;
 use std::ptr::{null, null_mut};
 
@@ -97,6 +97,15 @@ impl Row {
     }
 }
 
+/// Gets all variables of a kind.
+macro_rules! get_all {
+    ($i:expr, $get:ident, $kind:pat, $empty:expr) => {{
+        let references = $i.fmu.references(|variable| matches!(variable.kind, $kind));
+        let mut values = vec![$empty; references.len()];
+        c!($i, $get($i.component, references.as_ptr(), references.len(), values.as_mut_ptr()))
+    }};
+}
+
 /// All functions that answer for an instance. `fmi2FreeInstance` returns nothing and has its own
 /// test, as have the functions that need no instance.
 ///
@@ -110,10 +119,10 @@ pub const TABLE: &[Row] = &[
     Row("fmi2ExitInitializationMode",        |i, _| c!(i, fmi2ExitInitializationMode(i.component)),               "N",      "N",     OK),
     Row("fmi2Terminate",                     |i, _| c!(i, fmi2Terminate(i.component)),                            "EC",     "S",     OK),
     Row("fmi2Reset",                         |i, _| c!(i, fmi2Reset(i.component)),                                "INECTX", "INSTX", OK),
-    Row("fmi2GetReal",                       |i, _| get_real(i),                                                  "NECTX",  "NSTX",  OK),
-    Row("fmi2GetInteger",                    |i, _| get_integer(i),                                               "NECTX",  "NSTX",  OK),
-    Row("fmi2GetBoolean",                    |i, _| get_boolean(i),                                               "NECTX",  "NSTX",  OK),
-    Row("fmi2GetString",                     |i, _| get_string(i),                                                "NECTX",  "NSTX",  OK),
+    Row("fmi2GetReal",                       |i, _| get_all!(i, fmi2GetReal, VariableKind::Real { .. }, 0.0), "NECTX",  "NSTX",  OK),
+    Row("fmi2GetInteger",                    |i, _| get_all!(i, fmi2GetInteger, VariableKind::Integer { .. } | VariableKind::Enumeration { .. }, 0), "NECTX",  "NSTX",  OK),
+    Row("fmi2GetBoolean",                    |i, _| get_all!(i, fmi2GetBoolean, VariableKind::Boolean { .. }, 0), "NECTX",  "NSTX",  OK),
+    Row("fmi2GetString",                     |i, _| get_all!(i, fmi2GetString, VariableKind::String { .. }, null()), "NECTX",  "NSTX",  OK),
     Row("fmi2SetReal",                       |i, _| i.set_real(i.fmu.input(), 0.01),                             "INEC",   "INS",   OK),
     Row("fmi2SetInteger",                    |i, _| c!(i, fmi2SetInteger(i.component, null(), 0, null())),        "INE",    "INS",   OK),
     Row("fmi2SetBoolean",                    |i, _| c!(i, fmi2SetBoolean(i.component, null(), 0, null())),        "INE",    "INS",   OK),
@@ -148,33 +157,6 @@ pub const TABLE: &[Row] = &[
     Row("fmi2GetBooleanStatus",              |i, _| c!(i, fmi2GetBooleanStatus(i.component, 3, &mut 0)),          "",       "ST",    OK),
     Row("fmi2GetStringStatus",               |i, _| c!(i, fmi2GetStringStatus(i.component, 1, &mut null())),      "",       "ST",    OK),
 ];
-
-fn get_real(i: &Instance) -> Status {
-    let references = i.fmu.references(|v| matches!(v.kind, VariableKind::Real { .. }));
-    let mut values = vec![0.0; references.len()];
-    c!(i, fmi2GetReal(i.component, references.as_ptr(), references.len(), values.as_mut_ptr()))
-}
-
-fn get_integer(i: &Instance) -> Status {
-    let is_whole = |v: &Variable| {
-        matches!(v.kind, VariableKind::Integer { .. } | VariableKind::Enumeration { .. })
-    };
-    let references = i.fmu.references(is_whole);
-    let mut values = vec![0; references.len()];
-    c!(i, fmi2GetInteger(i.component, references.as_ptr(), references.len(), values.as_mut_ptr()))
-}
-
-fn get_boolean(i: &Instance) -> Status {
-    let references = i.fmu.references(|v| matches!(v.kind, VariableKind::Boolean { .. }));
-    let mut values = vec![0; references.len()];
-    c!(i, fmi2GetBoolean(i.component, references.as_ptr(), references.len(), values.as_mut_ptr()))
-}
-
-fn get_string(i: &Instance) -> Status {
-    let references = i.fmu.references(|v| matches!(v.kind, VariableKind::String { .. }));
-    let mut values = vec![null(); references.len()];
-    c!(i, fmi2GetString(i.component, references.as_ptr(), references.len(), values.as_mut_ptr()))
-}
 
 fn free_state(i: &Instance) -> Status {
     c!(i, fmi2FreeFMUstate(i.component, &mut { i.save() }))

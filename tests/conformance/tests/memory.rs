@@ -3,7 +3,7 @@
 #![cfg(all(target_os = "linux", target_env = "gnu"))]
 
 use conformance::interface::CO_SIMULATION;
-use conformance::{Fmu, Instance, fmus};
+use conformance::{Instance, fmus, fmus_and_interfaces};
 
 /// Bytes that the C library's allocator handed out and did not get back. Rust's allocations go
 /// through it too. Resident memory would also count its free lists, which grow irregularly.
@@ -36,18 +36,12 @@ fn live(instance: Instance) {
     instance.save();
 }
 
-fn kinds(fmus: &[Fmu]) -> Vec<(&Fmu, i32)> {
-    fmus.iter()
-        .flat_map(|fmu| fmu.interfaces().iter().map(move |&fmu_type| (fmu, fmu_type)))
-        .collect()
-}
-
 #[test]
 fn three_thousand_instances_and_three_hundred_libraries_leave_nothing_behind() {
     let fmus = fmus();
-    let kinds = kinds(&fmus);
+    let kinds: Vec<_> = fmus_and_interfaces().collect();
     let instances = growth(300, 3000, |i| {
-        let (fmu, fmu_type) = kinds[i % kinds.len()];
+        let &(ref fmu, fmu_type) = &kinds[i % kinds.len()];
         match fmu_type {
             CO_SIMULATION => live(fmu.instance(fmu_type)),
             _ => drop(fmu.instance(fmu_type).initialized().integrate(0..1)),
@@ -55,7 +49,7 @@ fn three_thousand_instances_and_three_hundred_libraries_leave_nothing_behind() {
     });
     assert!(instances < ALLOWED, "3000 instances have left {instances} bytes");
     let names: Vec<_> = fmus.iter().map(|fmu| fmu.name().to_owned()).collect();
-    drop(fmus);
+    drop((fmus, kinds));
     let libraries = growth(60, 300, |i| {
         let name = names[i % names.len()].clone();
         // The thread ends after the libraries are closed, and releases their memory.

@@ -100,10 +100,6 @@ impl Model {
 
     #[allow(clippy::too_many_lines, reason = "a table")]
     fn ask(&mut self, row: &Row, bytes: &mut Bytes) -> Answer {
-        use State::{
-            ContinuousTimeMode, EventMode, InitializationMode, Instantiated, StepComplete,
-            Terminated,
-        };
         let &Row(name, call, ..) = row;
         let i = &self.instance;
         let (it, fmu) = (i.component, &i.fmu);
@@ -126,33 +122,12 @@ impl Model {
                 c!(i, fmi2SetDebugLogging(it, bytes.whole() & 1, bytes.below(4), names.as_ptr()))
             }
             "fmi2Reset" => {
-                next = Instantiated;
+                next = State::Instantiated;
                 self.time = 0.0;
                 call(i, null_mut())
             }
-            "fmi2EnterInitializationMode" => {
-                next = InitializationMode;
-                call(i, null_mut())
-            }
-            "fmi2ExitInitializationMode" => {
-                next = if self.fmu_type == MODEL_EXCHANGE { EventMode } else { StepComplete };
-                call(i, null_mut())
-            }
-            "fmi2Terminate" => {
-                next = Terminated;
-                call(i, null_mut())
-            }
-            "fmi2EnterEventMode" => {
-                next = EventMode;
-                call(i, null_mut())
-            }
-            "fmi2EnterContinuousTimeMode" => {
-                next = ContinuousTimeMode;
-                call(i, null_mut())
-            }
             "fmi2GetReal" => {
-                let references =
-                    bytes.references(fmu, |kind| matches!(kind, VariableKind::Real { .. }));
+                let references = bytes.references(fmu, is_real);
                 let mut values = vec![f64::NAN; references.len()];
                 let n = references.len();
                 let status = c!(i, fmi2GetReal(it, references.as_ptr(), n, values.as_mut_ptr()));
@@ -165,24 +140,21 @@ impl Model {
                 c!(i, fmi2GetInteger(it, references.as_ptr(), n, values.as_mut_ptr()))
             }
             "fmi2GetBoolean" => {
-                let references =
-                    bytes.references(fmu, |kind| matches!(kind, VariableKind::Boolean { .. }));
+                let references = bytes.references(fmu, is_boolean);
                 let (n, mut values) = (references.len(), vec![0; references.len()]);
                 let status = c!(i, fmi2GetBoolean(it, references.as_ptr(), n, values.as_mut_ptr()));
                 is_right = values.iter().all(|value| [0, 1].contains(value));
                 status
             }
             "fmi2GetString" => {
-                let references =
-                    bytes.references(fmu, |kind| matches!(kind, VariableKind::String { .. }));
+                let references = bytes.references(fmu, is_string);
                 let (n, mut values) = (references.len(), vec![null(); references.len()]);
                 let status = c!(i, fmi2GetString(it, references.as_ptr(), n, values.as_mut_ptr()));
                 is_right = values.iter().all(|value| !value.is_null());
                 status
             }
             "fmi2SetReal" => {
-                let references =
-                    bytes.references(fmu, |kind| matches!(kind, VariableKind::Real { .. }));
+                let references = bytes.references(fmu, is_real);
                 let values: Vec<_> = references.iter().map(|_| bytes.real()).collect();
                 is_right =
                     self.are_settable(&references) && values.iter().all(|value| value.is_finite());
@@ -195,16 +167,14 @@ impl Model {
                 c!(i, fmi2SetInteger(it, references.as_ptr(), values.len(), values.as_ptr()))
             }
             "fmi2SetBoolean" => {
-                let references =
-                    bytes.references(fmu, |kind| matches!(kind, VariableKind::Boolean { .. }));
+                let references = bytes.references(fmu, is_boolean);
                 let values: Vec<_> = references.iter().map(|_| bytes.whole()).collect();
                 is_right = self.are_settable(&references)
                     && values.iter().all(|value| [0, 1].contains(value));
                 c!(i, fmi2SetBoolean(it, references.as_ptr(), values.len(), values.as_ptr()))
             }
             "fmi2SetString" => {
-                let references =
-                    bytes.references(fmu, |kind| matches!(kind, VariableKind::String { .. }));
+                let references = bytes.references(fmu, is_string);
                 let text = CString::new(vec![1 + bytes.byte() % 255; bytes.below(40)]);
                 let text = text.expect("no zero");
                 let values = vec![text.as_ptr(); references.len()];
@@ -230,7 +200,7 @@ impl Model {
                 self.time = f64::NAN;
                 let status = call(i, handle);
                 // Only an instance that has been initialized reports its time.
-                if status == OK && next == StepComplete {
+                if status == OK && next == State::StepComplete {
                     c!(i, fmi2GetRealStatus(it, 2, &mut self.time));
                 }
                 status
@@ -265,10 +235,8 @@ impl Model {
                 status
             }
             "fmi2GetDirectionalDerivative" => {
-                let unknowns =
-                    bytes.references(fmu, |kind| matches!(kind, VariableKind::Real { .. }));
-                let knowns =
-                    bytes.references(fmu, |kind| matches!(kind, VariableKind::Real { .. }));
+                let unknowns = bytes.references(fmu, is_real);
+                let knowns = bytes.references(fmu, is_real);
                 let seed: Vec<_> = knowns.iter().map(|_| bytes.real()).collect();
                 let mut values = vec![0.0; unknowns.len()];
                 let (nu, nk) = (unknowns.len(), knowns.len());
@@ -294,8 +262,7 @@ impl Model {
                 status
             }
             "fmi2SetRealInputDerivatives" => {
-                let references =
-                    bytes.references(fmu, |kind| matches!(kind, VariableKind::Real { .. }));
+                let references = bytes.references(fmu, is_real);
                 let orders: Vec<_> = references.iter().map(|_| bytes.whole()).collect();
                 let values: Vec<_> = references.iter().map(|_| bytes.real()).collect();
                 is_right = self.are_settable(&references)
@@ -318,7 +285,10 @@ impl Model {
                 }
                 status
             }
-            _ => call(i, null_mut()),
+            _ => {
+                next = state_after(name, self.fmu_type).unwrap_or(next);
+                call(i, null_mut())
+            }
         };
         Answer { status, is_right, next }
     }
@@ -341,6 +311,31 @@ impl Model {
             }
         }
     }
+}
+
+/// State to which a function without arguments leads, if it is one that leads to another state.
+fn state_after(name: &str, fmu_type: c_int) -> Option<State> {
+    Some(match name {
+        "fmi2EnterInitializationMode" => State::InitializationMode,
+        "fmi2ExitInitializationMode" if fmu_type == MODEL_EXCHANGE => State::EventMode,
+        "fmi2ExitInitializationMode" => State::StepComplete,
+        "fmi2Terminate" => State::Terminated,
+        "fmi2EnterEventMode" => State::EventMode,
+        "fmi2EnterContinuousTimeMode" => State::ContinuousTimeMode,
+        _ => return None,
+    })
+}
+
+fn is_real(kind: &VariableKind) -> bool {
+    matches!(kind, VariableKind::Real { .. })
+}
+
+fn is_boolean(kind: &VariableKind) -> bool {
+    matches!(kind, VariableKind::Boolean { .. })
+}
+
+fn is_string(kind: &VariableKind) -> bool {
+    matches!(kind, VariableKind::String { .. })
 }
 
 fn is_whole(kind: &VariableKind) -> bool {

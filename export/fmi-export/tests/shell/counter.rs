@@ -5,7 +5,6 @@ use fmi_export::{Context, Description, Failure, Inputs, LastEvent, Model, Variab
 use model_description::DefaultExperiment;
 use serde::{Deserialize, Serialize};
 use settings::{Choice, Declared, Place, Setting};
-use std::path::Path;
 
 /// Time (s) at which the simulation ends with the defect `end`.
 pub(crate) const ENDS_AT: f64 = 0.75;
@@ -45,9 +44,6 @@ pub(crate) struct Counter {
     /// Sum of the increments.
     #[setting(name = "count", output, discrete)]
     seen: f64,
-    /// The resource folder.
-    #[setting(output)]
-    resources: String,
     #[setting(output)]
     parity: Parity,
     /// Resets of this model.
@@ -83,10 +79,6 @@ impl Model for Counter {
         if self.defect == "parameter" {
             return Err(Failure::Error("defect = parameter is not allowed".into()));
         }
-        self.resources = context
-            .resources
-            .map_or("none", |path: &Path| path.to_str().unwrap_or_default())
-            .into();
         self.count = context.start_time;
         Ok(())
     }

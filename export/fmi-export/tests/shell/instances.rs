@@ -8,32 +8,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicPtr, Ordering};
 
 #[test]
-#[allow(unsafe_code)]
-fn the_library_says_what_it_is() {
-    // SAFETY: both functions return static NUL-terminated texts of the library.
-    let texts = [crate::fmi2::fmi2GetVersion(), crate::fmi2::fmi2GetTypesPlatform()]
-        .map(|text| unsafe { CStr::from_ptr(text) });
-    assert_eq!(texts, [c"2.0", c"default"]);
-}
-
-#[test]
-fn the_resource_folder_reaches_the_model() {
-    const RESOURCES: u32 = 3;
-    for (uri, expected) in [
-        (None, "none"),
-        (Some(c"file:///tmp/a%20b/resources/"), "/tmp/a b/resources"),
-        (Some(c"file:/tmp/Gr%C3%B6%C3%9Fe"), "/tmp/Größe"),
-    ] {
-        let instance = instantiate(Some(c"it"), CO_SIMULATION, Some(&guid("Counter")), uri, true);
-        instance.initialize();
-        assert_eq!(instance.string(RESOURCES), expected);
-    }
-}
-
-#[test]
 fn a_reset_keeps_the_model_unless_it_has_failed() {
     const COUNT: u32 = 2;
-    const RESETS: u32 = 5;
+    const RESETS: u32 = 4;
     let counter = Instance::new("Counter", CO_SIMULATION);
     for resets in 1..4 {
         counter.initialize();

@@ -20,32 +20,32 @@ fn crossing_the_switch(logging: bool, prepare: impl Fn(&Instance)) -> Vec<String
     messages.into_iter().map(|message| message.category).collect()
 }
 
-fn choose(instance: &Instance, on: bool, names: &[&std::ffi::CStr]) -> FmiStatus {
+fn choose(instance: &Instance, on: bool, names: &[&CStr]) -> FmiStatus {
     let names: Vec<_> = names.iter().map(|name| name.as_ptr()).collect();
     c!(fmi2SetDebugLogging(instance.component, i32::from(on), names.len(), names.as_ptr()))
 }
 
 #[test]
-fn with_logging_on_everything_is_reported() {
-    let heard = crossing_the_switch(true, |_| ());
-    assert_eq!(heard, ["logEvents", "logStatusWarning", "logStatusError"]);
-}
-
-#[test]
-fn with_logging_off_errors_are_reported_all_the_same() {
-    assert_eq!(crossing_the_switch(false, |_| ()), ["logStatusError"]);
-    let switched_off = crossing_the_switch(true, |instance| {
-        assert_eq!(choose(instance, false, &[]), FmiStatus::Ok);
-    });
-    assert_eq!(switched_off, ["logStatusError"]);
-}
-
-#[test]
-fn categories_are_chosen_by_name() {
-    let heard = crossing_the_switch(false, |instance| {
-        assert_eq!(choose(instance, true, &[c"logStatusWarning"]), FmiStatus::Ok);
-    });
-    assert_eq!(heard, ["logStatusWarning", "logStatusError"]);
+fn the_chosen_categories_and_all_errors_are_reported() {
+    const ALL: [&str; 3] = ["logEvents", "logStatusWarning", "logStatusError"];
+    type Choice<'a> = Option<(bool, &'a [&'a CStr])>;
+    // Whether logging is on at first, and what is switched on or off then.
+    let cases: [(bool, Choice, &[&str]); 6] = [
+        (true, None, &ALL),
+        (false, None, &ALL[2..]),
+        (true, Some((false, &[])), &ALL[2..]),
+        (false, Some((true, &[c"logStatusWarning"])), &ALL[1..]),
+        (false, Some((true, &[c"logAll"])), &ALL),
+        (true, Some((false, &[c"logEvents"])), &ALL[1..]),
+    ];
+    for (logging, choice, expected) in cases {
+        let heard = crossing_the_switch(logging, |instance| {
+            if let Some((on, names)) = choice {
+                assert_eq!(choose(instance, on, names), FmiStatus::Ok);
+            }
+        });
+        assert_eq!(heard, expected, "{choice:?}");
+    }
 }
 
 #[test]

@@ -18,32 +18,6 @@ fn run(instance: &Instance, from: i32) -> Vec<u64> {
 }
 
 #[test]
-fn a_state_can_be_written_over() {
-    let instance = Instance::stepping();
-    let mut state = instance.save();
-    run(&instance, 0);
-    let before = state;
-    assert_eq!(c!(fmi2GetFMUstate(instance.component, &mut state)), FmiStatus::Ok);
-    assert_eq!(state, before);
-    let expected = run(&instance, 3);
-    assert_eq!(c!(fmi2SetFMUstate(instance.component, state)), FmiStatus::Ok);
-    assert_eq!(run(&instance, 3), expected);
-}
-
-#[test]
-fn bytes_restore_another_instance_bit_for_bit() {
-    let first = Instance::stepping();
-    run(&first, 0);
-    let bytes = first.serialize();
-    let second = Instance::lag(CO_SIMULATION);
-    let (status, state) = second.deserialize(&bytes);
-    assert_eq!(status, FmiStatus::Ok);
-    assert_eq!(c!(fmi2SetFMUstate(second.component, state)), FmiStatus::Ok);
-    assert_eq!(second.serialize(), bytes);
-    assert_eq!(run(&second, 3), run(&first, 3));
-}
-
-#[test]
 fn pending_input_derivatives_are_part_of_the_state() {
     let instance = Instance::stepping();
     let (order, value) = (1, 2.0);
@@ -56,35 +30,6 @@ fn pending_input_derivatives_are_part_of_the_state() {
     assert_eq!(c!(fmi2SetFMUstate(component, state)), FmiStatus::Ok);
     assert_eq!(instance.step(0.0, 0.5), FmiStatus::Ok);
     assert_eq!(instance.real(X).to_bits(), expected.to_bits());
-}
-
-#[test]
-fn a_handle_that_is_not_ones_own_is_refused() {
-    let (one, other) = (Instance::stepping(), Instance::stepping());
-    let state = one.save();
-    assert_eq!(c!(fmi2SetFMUstate(other.component, state)), FmiStatus::Error);
-    other.said(&["not made by this instance"]);
-    let mut freed = state;
-    assert_eq!(c!(fmi2FreeFMUstate(one.component, &mut freed)), FmiStatus::Ok);
-    assert_eq!(c!(fmi2SetFMUstate(one.component, state)), FmiStatus::Error);
-    let mut twice = state;
-    assert_eq!(c!(fmi2FreeFMUstate(one.component, &mut twice)), FmiStatus::Error);
-    let mut size = 0;
-    assert_eq!(c!(fmi2SerializedFMUstateSize(one.component, state, &mut size)), FmiStatus::Error);
-    // None of these refusals ends the simulation.
-    assert_eq!(one.step(0.0, 0.1), FmiStatus::Ok);
-    assert_eq!(other.step(0.0, 0.1), FmiStatus::Ok);
-}
-
-#[test]
-fn an_instance_in_error_goes_on_from_a_saved_state() {
-    let instance = Instance::stepping();
-    run(&instance, 0);
-    let state = instance.save();
-    assert_eq!(instance.set_real(U, f64::NAN), FmiStatus::Error);
-    assert_eq!(instance.step(0.9, 0.3), FmiStatus::Error);
-    assert_eq!(c!(fmi2SetFMUstate(instance.component, state)), FmiStatus::Ok);
-    run(&instance, 3);
 }
 
 #[test]

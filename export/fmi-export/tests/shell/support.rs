@@ -186,10 +186,6 @@ impl Instance {
         c!(fmi2SetReal(self.component, &reference, 1, &value))
     }
 
-    pub(crate) fn set_integer(&self, reference: u32, value: i32) -> FmiStatus {
-        c!(fmi2SetInteger(self.component, &reference, 1, &value))
-    }
-
     pub(crate) fn set_string(&self, reference: u32, value: &CStr) -> FmiStatus {
         let value = value.as_ptr();
         c!(fmi2SetString(self.component, &reference, 1, &value))
@@ -217,14 +213,6 @@ impl Instance {
         let mut value = i32::MIN;
         assert_eq!(c!(fmi2GetBoolean(self.component, &reference, 1, &mut value)), FmiStatus::Ok);
         value
-    }
-
-    pub(crate) fn string(&self, reference: u32) -> String {
-        let mut value = null();
-        assert_eq!(c!(fmi2GetString(self.component, &reference, 1, &mut value)), FmiStatus::Ok);
-        // SAFETY: the call succeeded, so `value` points to a text that is NUL-terminated and lives
-        // until the next fmi2GetString.
-        unsafe { CStr::from_ptr(value) }.to_str().unwrap().to_owned()
     }
 
     pub(crate) fn step(&self, point: f64, size: f64) -> FmiStatus {
@@ -260,16 +248,5 @@ impl Instance {
         );
         assert_eq!(c!(fmi2FreeFMUstate(self.component, &mut state)), FmiStatus::Ok);
         bytes
-    }
-
-    pub(crate) fn deserialize(&self, bytes: &[u8]) -> (FmiStatus, *mut c_void) {
-        let mut state = null_mut();
-        let status = c!(fmi2DeSerializeFMUstate(
-            self.component,
-            bytes.as_ptr().cast(),
-            bytes.len(),
-            &mut state
-        ));
-        (status, state)
     }
 }

@@ -45,14 +45,6 @@ fn one_refused_value_refuses_all_of_the_call() {
 }
 
 #[test]
-fn a_fixed_parameter_cannot_be_set_after_initialization() {
-    let instance = Instance::stepping();
-    assert_eq!(instance.set_real(GAIN, 3.0), FmiStatus::Error);
-    instance.said(&["'gain.early' is a fixed parameter"]);
-    assert_eq!(instance.real(GAIN), 2.0);
-}
-
-#[test]
 fn parameters_set_in_initialization_mode_are_taken_up_before_the_next_read() {
     let instance = initializing();
     assert_eq!(instance.real(X), 0.5);
@@ -65,30 +57,6 @@ fn parameters_set_in_initialization_mode_are_taken_up_before_the_next_read() {
     assert_eq!(instance.set_real(INITIAL, -1.0), FmiStatus::Ok);
     assert_eq!(c!(fmi2ExitInitializationMode(instance.component)), FmiStatus::Ok);
     assert_eq!(instance.real(X), -1.0);
-}
-
-#[test]
-fn a_parameter_that_the_model_refuses_stops_initialization() {
-    let instance = initializing();
-    assert_eq!(instance.set_integer(ORDER, 2), FmiStatus::Ok);
-    assert_eq!(c!(fmi2ExitInitializationMode(instance.component)), FmiStatus::Error);
-    instance.said(&["fmi2ExitInitializationMode: order = 2, but only 1 is supported"]);
-    assert_eq!(c!(fmi2Reset(instance.component)), FmiStatus::Ok);
-    instance.initialize();
-}
-
-#[test]
-fn after_an_error_values_can_be_read_but_not_set() {
-    let instance = Instance::stepping();
-    assert_eq!(instance.set_real(U, f64::NAN), FmiStatus::Error);
-    assert_eq!(instance.get_real(U), (FmiStatus::Ok, 0.0));
-    assert_eq!(instance.set_real(U, 1.0), FmiStatus::Error);
-    instance.said(&["not allowed in state error"]);
-    assert_eq!(instance.step(0.0, 0.1), FmiStatus::Error);
-    assert_eq!(c!(fmi2Reset(instance.component)), FmiStatus::Ok);
-    instance.initialize();
-    assert_eq!(instance.set_real(U, 1.0), FmiStatus::Ok);
-    assert_eq!(instance.step(0.0, 0.1), FmiStatus::Ok);
 }
 
 #[test]

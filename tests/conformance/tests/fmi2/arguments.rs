@@ -128,7 +128,7 @@ const NULLS_OF_SIMULATION: &[(Call, &str)] = &[
     (|i| c!(i, fmi2SetRealInputDerivatives(i.component, null(), 1, &1, &0.0)), "fmi2SetRealInputDerivatives: argument 'vr' is NULL"),
     (|i| c!(i, fmi2SetRealInputDerivatives(i.component, &0, 1, null(), &0.0)), "fmi2SetRealInputDerivatives: argument 'order' is NULL"),
     (|i| c!(i, fmi2SetRealInputDerivatives(i.component, &0, 1, &1, null())), "fmi2SetRealInputDerivatives: argument 'value' is NULL"),
-    (|i| c!(i, fmi2GetRealOutputDerivatives(i.component, null(), 1, null(), null_mut())), "fmi2GetRealOutputDerivatives: "),
+    (|i| c!(i, fmi2GetRealOutputDerivatives(i.component, &0, 1, &1, &mut 0.0)), "maxOutputDerivativeOrder is 0"),
     (|i| c!(i, fmi2GetStatus(i.component, 0, null_mut())), "fmi2GetStatus: argument 'value' is NULL"),
     (|i| c!(i, fmi2GetRealStatus(i.component, 2, null_mut())), "fmi2GetRealStatus: argument 'value' is NULL"),
     (|i| c!(i, fmi2GetBooleanStatus(i.component, 3, null_mut())), "fmi2GetBooleanStatus: argument 'value' is NULL"),

@@ -2,7 +2,7 @@
 
 use conformance::interface::{CO_SIMULATION, ERROR, FUNCTIONS, MODEL_EXCHANGE, OK, Status};
 use conformance::table::{Row, State, TABLE, instance_in, settable, states};
-use conformance::{Instance, c, fmus, fmus_and_interfaces, ok};
+use conformance::{Instance, c, driver, fmus, fmus_and_interfaces, ok};
 use model_description::variable::VariableKind;
 use std::ffi::{CString, c_int};
 use std::ptr::null_mut;
@@ -94,7 +94,7 @@ fn oracle_calls_of_model_exchange_are_allowed_where_the_standard_says() {
 #[test]
 fn after_a_refused_call_a_reset_makes_a_new_instance() {
     for (fmu, fmu_type) in fmus_and_interfaces() {
-        let drive = if fmu_type == MODEL_EXCHANGE { Instance::integrate } else { Instance::drive };
+        let drive = driver(fmu_type);
         let expected = drive(&fmu.instance(fmu_type).initialized(), 0..3);
         for state in states(fmu_type) {
             let instance = instance_in(&fmu, fmu_type, state);

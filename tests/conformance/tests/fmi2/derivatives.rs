@@ -91,20 +91,3 @@ fn a_derivative_acts_within_the_step() {
         assert!(after(slope) == after(slope), "{}", fmu.name());
     }
 }
-
-#[test]
-fn no_fmu_provides_derivatives_of_outputs() {
-    for fmu in fmus() {
-        for reference in fmu.references(|variable| variable.causality == Causality::Output) {
-            let instance = fmu.instance(CO_SIMULATION).initialized();
-            let component = instance.component;
-            let status =
-                c!(instance, fmi2GetRealOutputDerivatives(component, &reference, 1, &1, &mut 0.0));
-            instance.refused(
-                status,
-                ERROR,
-                &["fmi2GetRealOutputDerivatives", "maxOutputDerivativeOrder is 0"],
-            );
-        }
-    }
-}

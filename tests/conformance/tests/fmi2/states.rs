@@ -2,21 +2,37 @@
 //! anything is wrong with them. Their use in another process is tested with the packed archives
 //! (tests/test_states.py).
 
-use conformance::interface::{CO_SIMULATION, ERROR, FATAL, MODEL_EXCHANGE, OK};
-use conformance::{Bits, Fmu, Instance, c, fmus, fmus_and_interfaces, ok};
+use conformance::interface::{CO_SIMULATION, ERROR, FATAL, OK};
+use conformance::{Fmu, Instance, c, driver, fmus, fmus_and_interfaces, ok};
 use model_description::variable::VariableKind;
-use std::ops::Range;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-fn driver(fmu_type: i32) -> fn(&Instance, Range<u32>) -> Vec<Bits> {
-    if fmu_type == MODEL_EXCHANGE { Instance::integrate } else { Instance::drive }
+/// Parameters with which an FMU has states of other kinds: none, surfaces and sensors, a delay, and
+/// a table.
+fn preparations(fmu: &Fmu) -> &'static [fn(&Instance)] {
+    const ALL: [fn(&Instance); 4] = [
+        |_| (),
+        |instance| {
+            let reference = instance.fmu.reference("sensor.set");
+            ok!(instance, fmi2SetInteger(&reference, 1, &2));
+            instance.choose("actuation", "surfacesAndJets");
+        },
+        |instance| {
+            let reference = instance.fmu.reference("actuation.delay");
+            instance.ok(instance.set_real(reference, 0.1));
+        },
+        tabulate,
+    ];
+    if fmu.name() == "ReentryPlant" { &ALL } else { &ALL[..1] }
 }
 
 /// Returns an instance in the middle of a simulation.
-fn running(fmu: &Fmu, fmu_type: i32) -> Instance {
-    let instance = fmu.instance(fmu_type).initialized();
+fn running(fmu: &Fmu, fmu_type: i32, prepare: fn(&Instance)) -> Instance {
+    let instance = fmu.instance(fmu_type);
+    prepare(&instance);
+    let instance = instance.initialized();
     driver(fmu_type)(&instance, 0..4);
     instance.forget();
     instance
@@ -25,38 +41,42 @@ fn running(fmu: &Fmu, fmu_type: i32) -> Instance {
 #[test]
 fn handles_and_bytes_bring_back_the_same_future() {
     for (fmu, fmu_type) in fmus_and_interfaces() {
-        let drive = driver(fmu_type);
-        let instance = running(&fmu, fmu_type);
-        let (mut handle, bytes) = (instance.save(), instance.serialize());
-        let expected = drive(&instance, 4..12);
-        instance.restore(handle);
-        assert!(drive(&instance, 4..12) == expected, "{}", fmu.name());
-        // The same handle is overwritten with the present state.
-        let (before, present) = (handle, instance.serialize());
-        ok!(instance, fmi2GetFMUstate(&mut handle));
-        assert_eq!(handle, before);
-        ok!(instance, fmi2Reset());
-        instance.restore(handle);
-        assert!(instance.serialize() == present, "{}", fmu.name());
-        // A state from bytes works in an instance that was never initialized.
-        let other = fmu.instance(fmu_type);
-        let (status, state) = other.deserialize(&bytes);
-        other.ok(status);
-        other.restore(state);
-        assert!(drive(&other, 4..12) == expected, "{}", fmu.name());
-        // Freeing sets the handle to NULL, and freeing NULL is allowed.
-        ok!(instance, fmi2FreeFMUstate(&mut handle));
-        assert!(handle.is_null());
-        ok!(instance, fmi2FreeFMUstate(&mut handle));
-        let status = c!(instance, fmi2SetFMUstate(instance.component, before));
-        instance.refused(status, ERROR, &["fmi2SetFMUstate", "was freed"]);
+        let (drive, mut futures) = (driver(fmu_type), Vec::new());
+        for &prepare in preparations(&fmu) {
+            let instance = running(&fmu, fmu_type, prepare);
+            let (mut handle, bytes) = (instance.save(), instance.serialize());
+            let expected = drive(&instance, 4..12);
+            assert!(!futures.contains(&expected), "{}: the parameters act", fmu.name());
+            instance.restore(handle);
+            assert!(drive(&instance, 4..12) == expected, "{}", fmu.name());
+            // The same handle is overwritten with the present state.
+            let (before, present) = (handle, instance.serialize());
+            ok!(instance, fmi2GetFMUstate(&mut handle));
+            assert_eq!(handle, before);
+            ok!(instance, fmi2Reset());
+            instance.restore(handle);
+            assert!(instance.serialize() == present, "{}", fmu.name());
+            // A state from bytes works in an instance that was never initialized.
+            let other = fmu.instance(fmu_type);
+            let (status, state) = other.deserialize(&bytes);
+            other.ok(status);
+            other.restore(state);
+            assert!(drive(&other, 4..12) == expected, "{}", fmu.name());
+            // Freeing sets the handle to NULL, and freeing NULL is allowed.
+            ok!(instance, fmi2FreeFMUstate(&mut handle));
+            assert!(handle.is_null());
+            ok!(instance, fmi2FreeFMUstate(&mut handle));
+            let status = c!(instance, fmi2SetFMUstate(instance.component, before));
+            instance.refused(status, ERROR, &["fmi2SetFMUstate", "was freed"]);
+            futures.push(expected);
+        }
     }
 }
 
 #[test]
 fn every_truncation_and_every_damaged_byte_is_refused() {
     for (fmu, fmu_type) in fmus_and_interfaces() {
-        let instance = running(&fmu, fmu_type);
+        let instance = running(&fmu, fmu_type, |_| ());
         let bytes = instance.serialize();
         let refuse = |bytes: &[u8], what: &str| {
             let (status, state) = instance.deserialize(bytes);
@@ -87,7 +107,7 @@ fn every_truncation_and_every_damaged_byte_is_refused() {
 fn states_of_other_fmus_and_interfaces_are_refused() {
     let fmus = fmus();
     let kinds = fmus.iter().flat_map(|fmu| fmu.interfaces().iter().map(move |&kind| (fmu, kind)));
-    let instances: Vec<_> = kinds.map(|(fmu, kind)| running(fmu, kind)).collect();
+    let instances: Vec<_> = kinds.map(|(fmu, kind)| running(fmu, kind, |_| ())).collect();
     for (i, instance) in instances.iter().enumerate() {
         let (component, before) = (instance.component, instance.serialize());
         for (_, other) in instances.iter().enumerate().filter(|&(j, _)| j != i) {
@@ -113,7 +133,7 @@ fn states_of_other_fmus_and_interfaces_are_refused() {
 #[test]
 fn bytes_fill_the_room_that_was_asked_for_and_no_more() {
     for fmu in fmus() {
-        let instance = running(&fmu, CO_SIMULATION);
+        let instance = running(&fmu, CO_SIMULATION, |_| ());
         let (state, component, bytes) = (instance.save(), instance.component, instance.serialize());
         let mut room = vec![0xaa_u8; bytes.len() + 16];
         let mut serialize = |size| {
@@ -242,51 +262,13 @@ fn tabulate(instance: &Instance) {
     }
 }
 
-#[test]
-fn a_state_saved_in_the_middle_of_a_table_brings_back_the_same_future() {
-    let fmu = conformance::fmu("ReentryPlant");
-    for &fmu_type in fmu.interfaces() {
-        let drive = driver(fmu_type);
-        let instance = fmu.instance(fmu_type);
-        tabulate(&instance);
-        let instance = instance.initialized();
-        drive(&instance, 0..4);
-        let (handle, bytes) = (instance.save(), instance.serialize());
-        let expected = drive(&instance, 4..20);
-        instance.restore(handle);
-        assert!(drive(&instance, 4..20) == expected);
-        let other = fmu.instance(fmu_type);
-        let (status, state) = other.deserialize(&bytes);
-        other.ok(status);
-        other.restore(state);
-        assert!(drive(&other, 4..20) == expected);
-        let real = |name: &str| other.real(fmu.reference(&format!("disturbance.{name}")));
-        let delta = ["alpha", "beta", "sigma"].map(|axis| real(&format!("delta.{axis}")).abs());
-        assert_eq!(delta.into_iter().fold(0.0, f64::max), real("bound"), "the table acts");
-    }
-}
-
 /// Approximate number of forgeries for each FMU.
 const FORGERIES: usize = 6000;
 
 #[test]
 fn forged_states_neither_hang_nor_panic() {
-    let plants: [fn(&Instance); 4] = [
-        |_| (),
-        |instance| {
-            let reference = instance.fmu.reference("sensor.set");
-            ok!(instance, fmi2SetInteger(&reference, 1, &2));
-            instance.choose("actuation", "surfacesAndJets");
-        },
-        |instance| {
-            let reference = instance.fmu.reference("actuation.delay");
-            instance.ok(instance.set_real(reference, 0.1));
-        },
-        tabulate,
-    ];
     for fmu in fmus() {
-        let prepared = if fmu.name() == "ReentryPlant" { &plants[..] } else { &plants[..1] };
-        for &prepare in prepared {
+        for &prepare in preparations(&fmu) {
             let doing = Arc::new(Mutex::new(String::new()));
             let (done, finished) = channel();
             let (name, fmu, shared) = (fmu.name().to_owned(), fmu.clone(), doing.clone());

@@ -1,8 +1,8 @@
 //! Tests of value references: one by one or all at once, wrong ones, repeated ones, and values at
 //! the limits.
 
-use conformance::interface::{CO_SIMULATION, ERROR, MODEL_EXCHANGE, OK, Status};
-use conformance::{Instance, c, fmus, ok};
+use conformance::interface::{CO_SIMULATION, ERROR, OK, Status};
+use conformance::{Instance, c, driver, fmus, ok};
 use model_description::variable::{Causality, VariableKind};
 use std::ffi::c_int;
 use std::ptr::null;
@@ -33,11 +33,7 @@ fn one_reference_per_call_gives_what_all_in_one_call_give() {
                     fmu.name()
                 );
                 assert_eq!(instance.real(input), value);
-                if fmu_type == MODEL_EXCHANGE {
-                    instance.integrate(tick..tick + 1);
-                } else {
-                    instance.drive(tick..tick + 1);
-                }
+                driver(fmu_type)(&instance, tick..tick + 1);
             }
         }
     }
