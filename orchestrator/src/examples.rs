@@ -52,16 +52,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn help_fits_a_terminal_of_80_columns_where_words_allow() {
-        let mut commands = definition().term_width(80);
-        commands.build();
-        for command in commands.get_subcommands_mut() {
-            let name = command.get_name().to_string();
-            for line in command.render_long_help().to_string().lines() {
-                assert!(line.chars().count() <= 80, "{name}: {line}");
-            }
-        }
-    }
 }

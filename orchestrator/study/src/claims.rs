@@ -188,6 +188,11 @@ mod tests {
     use std::path::Path;
     use sweep::table::{CaseTable, Column, Values};
 
+    fn study() -> Study {
+        let path = "../experiments/two-loop-smc/study.toml";
+        Study::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap()
+    }
+
     /// Returns a table with the values of a measure.
     fn measured(id: &str, values: &[Option<f64>]) -> CaseTable {
         let values = Values::Real(values.to_vec());
@@ -203,9 +208,7 @@ mod tests {
     #[test]
     fn equal_numbers_are_neither_below_nor_above() {
         use Relation::{Above, AtLeast, AtMost, Below};
-        let path =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../experiments/two-loop-smc/study.toml");
-        let study = Study::load(&path).unwrap();
+        let study = study();
         let check = study.claims[0].checks[0].clone();
         let (place, _) = resolve(&study, &check.left).unwrap();
         let held = |relation, value: f64, right: f64, by: Option<f64>| {
@@ -249,25 +252,8 @@ mod tests {
     }
 
     #[test]
-    fn a_claim_without_runs_is_not_judged() {
-        let path =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../experiments/two-loop-smc/study.toml");
-        let study = Study::load(&path).unwrap();
-        let runs = vec![RunResult::default(); study.runs.len()];
-        let results = Results { study: &study, runs };
-        assert!(!study.claims.is_empty());
-        for claim in &study.claims {
-            let judged = judge(claim, &results).unwrap();
-            assert_eq!(judged.verdict, Verdict::NotJudged, "{}", claim.says);
-            assert!(judged.checks.iter().all(|check| check.verdict() == Verdict::NotJudged));
-        }
-    }
-
-    #[test]
     fn a_member_without_the_number_does_not_hold_and_is_not_left_out() {
-        let path =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../experiments/two-loop-smc/study.toml");
-        let study = Study::load(&path).unwrap();
+        let study = study();
         let check = study.claims.iter().flat_map(|claim| &claim.checks);
         let check = check.clone().find(|check| check.left == "direct.measure.settling-02").unwrap();
         let mut runs = vec![RunResult::default(); study.runs.len()];

@@ -240,6 +240,3 @@ fn all_runs(results: &Results) -> Markup {
     });
     table(&["Run", "Experiment", "Changes to it", "Number of runs"], rows)
 }
-
-#[cfg(test)]
-mod tests;

@@ -81,8 +81,6 @@ pub(crate) struct Recipe<'a> {
     pub(crate) flags: &'a [&'a str],
     /// Change to the text of the model description.
     pub(crate) description: &'a dyn Fn(String) -> String,
-    /// Change to the bytes of the library.
-    pub(crate) library: &'a dyn Fn(Vec<u8>) -> Vec<u8>,
     /// Prefix of the names of the archive's entries.
     pub(crate) prefix: &'a str,
     /// Name of the library in the archive.
@@ -91,14 +89,7 @@ pub(crate) struct Recipe<'a> {
 
 impl Default for Recipe<'_> {
     fn default() -> Self {
-        Self {
-            files: FMI2,
-            flags: &[],
-            description: &|text| text,
-            library: &|bytes| bytes,
-            prefix: "",
-            name: "model.so",
-        }
+        Self { files: FMI2, flags: &[], description: &|text| text, prefix: "", name: "model.so" }
     }
 }
 
@@ -141,7 +132,7 @@ impl Bench {
         };
         let description = fs::read_to_string(source.join(recipe.files[1])).unwrap();
         add("modelDescription.xml", (recipe.description)(description).as_bytes());
-        let library = (recipe.library)(fs::read(&library).unwrap());
+        let library = fs::read(&library).unwrap();
         add(&format!("binaries/{}/{}", recipe.files[2], recipe.name), &library);
         zip.finish().unwrap();
         fs::write(folder.path().join("loop.toml"), experiment).unwrap();

@@ -108,19 +108,6 @@ fn on_own_disk(
 
 #[test]
 #[cfg(target_os = "linux")]
-fn the_file_that_fills_a_disk_is_named() {
-    let bench = Bench::new();
-    let run = ["run", "loop.toml", "--quiet", "--step=0.0001", "--isolate=false"];
-    let Some((code, errors)) = on_own_disk(&bench, "size=200k", "out", ":", &run) else {
-        return;
-    };
-    let last = errors.lines().last().unwrap();
-    let said = "error: out/loop/results.csv: No space left on device";
-    assert!(code == 1 && last.starts_with(said), "{errors}");
-}
-
-#[test]
-#[cfg(target_os = "linux")]
 fn a_temporary_folder_from_which_nothing_can_be_run_is_named() {
     let bench = Bench::new();
     let folder = bench.path("temporary").display().to_string();

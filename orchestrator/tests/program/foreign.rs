@@ -3,7 +3,6 @@
 
 use crate::bench::{Bench, LOOP, Recipe};
 use std::fs;
-use std::process::Command;
 
 /// Checks that standard error holds one line, which names the archive and not the temporary folder.
 fn told(errors: &str) -> &str {
@@ -107,61 +106,14 @@ fn a_status_that_does_not_exist_is_a_failure_of_that_call() {
 }
 
 #[test]
-fn what_is_wrong_with_a_library_is_told_by_its_entry() {
-    let message_with = |recipe: &Recipe| {
-        let bench = Bench::made(LOOP, recipe);
-        let (code, _, errors) = bench.run(&["--quiet"]);
-        assert_eq!(code, 2, "{errors}");
-        let (checked, text, _) = bench.call(&["inspect", "--check", "Model.fmu"]);
-        let text = text.replace("Model.fmu: ", "");
-        assert!(checked == 1 && errors.trim_end().ends_with(text.trim_end()), "{errors} {text}");
-        told(&errors).to_string()
-    };
-    let misnamed = message_with(&Recipe { name: "other.so", ..Recipe::default() });
-    assert!(
-        misnamed.ends_with(
-            "has no binaries/linux64/model.so, which its model identifier names; the folder holds: other.so"
-        ),
-        "{misnamed}"
-    );
-    // The field e_machine of an ELF file is 183 for AArch64.
-    let for_arm = |mut bytes: Vec<u8>| {
-        bytes[18..20].copy_from_slice(&[183, 0]);
-        bytes
-    };
-    let other = message_with(&Recipe { library: &for_arm, ..Recipe::default() });
-    assert!(
-        other.contains("binaries/linux64/model.so is for Aarch64 (Elf), this program needs"),
-        "{other}"
-    );
-    let torn =
-        message_with(&Recipe { library: &|bytes| bytes[..200].to_vec(), ..Recipe::default() });
-    assert!(torn.contains("binaries/linux64/model.so is damaged or not a library"), "{torn}");
-    let without = message_with(&Recipe { flags: &["-Dfmi2DoStep=step"], ..Recipe::default() });
-    assert!(
-        without.contains("binaries/linux64/model.so: undefined symbol: fmi2DoStep"),
-        "{without}"
-    );
-
-    let folder = tempfile::tempdir().unwrap();
-    let missing = folder.path().join("libnowhere.so");
-    let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
-    let made = Command::new(compiler)
-        .args(["-shared", "-x", "c", "/dev/null", "-o"])
-        .arg(&missing)
-        .status();
-    assert!(made.unwrap().success());
-    let path = format!("-L{}", folder.path().display());
-    let needing = message_with(&Recipe {
-        flags: &["-Wl,--no-as-needed", &path, "-lnowhere"],
-        ..Recipe::default()
-    });
-    assert!(
-        needing.ends_with(
-            "binaries/linux64/model.so needs libnowhere.so, which is not on this system"
-        ),
-        "{needing}"
-    );
+fn a_misnamed_library_is_told_by_run_and_check() {
+    let bench = Bench::made(LOOP, &Recipe { name: "other.so", ..Recipe::default() });
+    let (code, _, errors) = bench.run(&["--quiet"]);
+    let said = "has no binaries/linux64/model.so, which its model identifier names; the folder holds: other.so";
+    assert!(code == 2 && told(&errors).ends_with(said), "{errors}");
+    let (checked, text, _) = bench.call(&["inspect", "--check", "Model.fmu"]);
+    let text = text.replace("Model.fmu: ", "");
+    assert!(checked == 1 && errors.trim_end().ends_with(text.trim_end()), "{errors} {text}");
 }
 
 #[test]

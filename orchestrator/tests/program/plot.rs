@@ -42,14 +42,6 @@ fn a_run_is_drawn_as_its_experiment_says_or_as_it_is_asked_for() {
     let picture = plotted(&bench, &["a"]);
     assert!(picture.starts_with("<svg") && picture.contains("limit of norm"), "{picture}");
     assert!(picture.contains("α") && picture.contains("gain and integrator"));
-    // The norm that has the limit is bold. It exceeds the limit many times, in a panel of its own.
-    for picture in [picture, bench.text("a/plot.svg")] {
-        let width = |name: &str| {
-            let path = picture.split(&format!("<path data-name=\"{name}\"")).nth(1).unwrap();
-            path.split("stroke-width=\"").nth(1).unwrap().split('"').next().unwrap().to_string()
-        };
-        assert_eq!((width("norm").as_str(), width("α").as_str()), ("3", "1.8"), "{picture}");
-    }
     let picture = plotted(&bench, &["a", "--signals", "plant.*", "--out", "p/other.svg"]);
     assert!(picture.contains("steps") && !picture.contains("limit of norm"));
     let named = ["--signals", "plant.steps", "--signals", "plant.output.integral", "a", "b"];
@@ -103,14 +95,6 @@ fn oracle_the_numbers_of_a_page_are_those_of_the_runs() {
 }
 
 #[test]
-fn a_table_alone_has_neither_panels_nor_title() {
-    let bench = flown();
-    fs::copy(bench.path("a/results.csv"), bench.path("alone.csv")).unwrap();
-    let picture = plotted(&bench, &["alone.csv"]);
-    assert!(picture.contains("alone") && !picture.contains("limit of norm"));
-}
-
-#[test]
 fn a_run_writes_its_own_page_with_what_it_does_not_record() {
     let text =
         format!("{LOOP}{PANELS}").replace("variables = [\"gain.output.direct\", ", "variables = [");
@@ -140,15 +124,6 @@ fn the_page_of_a_run_without_panels_draws_what_is_recorded() {
 }
 
 #[test]
-fn figures_of_margins_are_svg() {
-    let bench = flown();
-    let (code, _, errors) = bench.call(&["margins", "loop.toml", "--plot", "a.pdf"]);
-    assert_eq!(code, 2, "{errors}");
-    let said = "--plot a.pdf: the name must end with .svg";
-    assert!(errors.contains(said), "{errors}");
-}
-
-#[test]
 fn what_cannot_be_drawn_is_refused_by_name() {
     let bench = flown();
     for (arguments, said) in [
@@ -170,4 +145,6 @@ fn what_cannot_be_drawn_is_refused_by_name() {
         assert!(errors.contains(said), "{errors}");
     }
     bench.fails(2, &["plot", "a", "--from", "-5", "--to", "nan"], "'nan' for '--to <SECONDS>'");
+    let margins = ["margins", "loop.toml", "--plot", "a.pdf"];
+    bench.fails(2, &margins, "--plot a.pdf: the name must end with .svg");
 }

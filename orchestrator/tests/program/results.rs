@@ -215,13 +215,6 @@ margins = {{ rate = "{prefix}.rateMargin", moment = "{prefix}.momentMargin" }}
     assert_eq!(metrics["guarantee_moment_margin_min"], 0.125);
     // The experiment names no limits.
     assert!(metrics["guarantee_broken"].is_null());
-    let (line, metrics) = guarantee("3.75");
-    assert_eq!(
-        line,
-        "  guarantee         in force throughout, margins 20.0 % (moment), 40.0 % (rate)"
-    );
-    assert!(metrics["guarantee_lost_at"].is_null());
-    assert_eq!(guarantee("0.5").0, "  guarantee         never in force (exceeded)");
     let (_, summary, _) = Bench::new().run(&[]);
     assert!(!summary.contains("guarantee"), "{summary}");
     let message = observed(&section("gain.fail")).refusal(&[]);
@@ -260,18 +253,6 @@ fn a_failing_instance_ends_the_run_with_its_own_words_and_keeps_the_results() {
     assert_eq!(code, 1);
     assert!(
         errors.contains("gain failed at t = 0 s in enterInitializationMode: gain too large: 500"),
-        "{errors}"
-    );
-}
-
-#[test]
-fn a_warning_is_told_once_with_first_time_and_count() {
-    let bench = Bench::new();
-    let (code, _, errors) = bench.run(&["--quiet", "--set", "plant.flag=true"]);
-    assert_eq!(code, 0);
-    assert_eq!(errors.lines().count(), 1, "{errors}");
-    assert!(
-        errors.contains("plant: [trouble] runs hot at 7 (first at t = 0 s, 3 times)"),
         "{errors}"
     );
 }

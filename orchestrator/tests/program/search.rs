@@ -22,28 +22,9 @@ fn a_search_finds_the_corner_and_writes_it_as_an_experiment() {
         let bytes = |out: &str| fs::read(bench.path(&format!("{out}/{file}"))).unwrap();
         assert!(bytes("w") == bytes("w1"), "{file}");
     }
+    let page = bench.text("w/report.html").replace("w/worst.toml", "w1/worst.toml");
+    assert_eq!(page, bench.text("w1/report.html"));
     bench.fails(2, &["campaign", "c.toml", "--worst", "--out", "w"], "--fresh replaces them");
     let without = crate::campaign::bench(RANDOM);
     without.fails(2, &["campaign", "c.toml", "--worst"], "[search] is missing");
-}
-
-#[test]
-fn the_page_of_a_search_shows_the_worst_case_against_its_limit() {
-    let text = format!("{RANDOM}[search]\nlargest = \"last\"\ncases = 60\n");
-    let bench = bench(&text);
-    let (code, said, errors) = bench.call(&["campaign", "c.toml", "--worst", "--out", "w"]);
-    assert_eq!(code, 0, "{errors}");
-    assert!(said.contains("w/report.html"), "{said}");
-    let page = bench.text("w/report.html");
-    let outcome = bench.json("w/search.json");
-    assert!(outcome["broken"][0] == "small" && page.contains("verdict not"), "{page}");
-    assert!(page.contains("orchestrator run w/worst.toml --page"), "{page}");
-    assert!(page.contains("<code>gain.gain</code>") && page.contains("largest so far"));
-    // The history alone, as the experiment draws nothing.
-    assert_eq!(page.matches("<svg xmlns").count(), 1);
-    // The page has no network.
-    assert!(!page.contains("src="), "{page}");
-    // The same search gives the same page.
-    bench.says(&["campaign", "c.toml", "--worst", "--out", "w", "--fresh"]);
-    assert!(bench.text("w/report.html") == page);
 }

@@ -2,18 +2,14 @@
 //! FMU is not a result.
 
 use crate::bench::{Bench, LOOP, Recipe};
-use crate::campaign::{CAMPAIGN, RANDOM, bench};
+use crate::campaign::{self, CAMPAIGN, RANDOM, bench};
 use std::collections::BTreeSet;
 use std::fs;
 
 /// A campaign in which a text of [`RANDOM`] is replaced.
 fn refusal(from: &str, to: &str) -> String {
     assert!(RANDOM.contains(from), "{from}");
-    let bench = bench(&RANDOM.replacen(from, to, 1));
-    let (code, _, errors) = bench.call(&["campaign", "c.toml", "--work"]);
-    assert_eq!(code, 2, "{to}: {errors}");
-    assert_eq!(errors.lines().count(), 1, "{errors}");
-    errors
+    campaign::refusal(&RANDOM.replacen(from, to, 1))
 }
 
 const UNIFORM: &str = "uniform = [0.0, \"1000 mm\"]";

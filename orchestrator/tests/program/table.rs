@@ -101,16 +101,6 @@ fn oracle_units_of_a_table_are_those_of_the_input() {
 fn faults_of_tables_name_file_and_place() {
     let message = bench("time,input\n1,2\n0,3\n").refusal(&[]);
     assert!(message.starts_with("error: ./drive.csv: line 3: \"time\" is \"0\""), "{message}");
-    let message = bench("time,inptu\n1,2\n").refusal(&[]);
-    assert!(message.contains("did you mean \"inptu\""), "{message}");
-    let late = ["--set", "drive.time[1]=3"];
-    let (code, _, errors) = bench(TABLE).run(&[&["--quiet"], &late[..]].concat());
-    assert_eq!(code, 1, "{errors}");
-    assert!(errors.contains("time[2] = 2 s is earlier than time[1] = 3 s"), "{errors}");
-    let bench = bench(TABLE);
-    fs::rename(bench.path("drive.csv"), bench.path("driver.csv")).unwrap();
-    let message = bench.refusal(&[]);
-    assert!(message.contains("did you mean \"driver.csv\""), "{message}");
 }
 
 #[test]

@@ -49,19 +49,6 @@ fn a_slow_component_is_named() {
     assert!(real_time["worst_miss"]["late_ms"].as_f64().unwrap() >= 29.9, "{real_time}");
 }
 
-#[test]
-fn factors_that_make_no_sense_are_refused() {
-    let bench = Bench::new();
-    for factor in ["0", "-1", "nan", "inf"] {
-        let (code, _, errors) = bench.run(&["--real-time", factor]);
-        assert_eq!(code, 2);
-        assert!(errors.contains("must be finite and above 0"), "{factor}: {errors}");
-    }
-    let (code, _, errors) = bench.call(&["run", "--real-time", "loop.toml"]);
-    assert_eq!(code, 2);
-    assert!(errors.contains("write the experiment before --real-time"), "{errors}");
-}
-
 /// Starts the program, sends it a signal once the file `awaited` exists, and returns its exit code.
 #[cfg(unix)]
 pub(crate) fn signalled(
@@ -192,18 +179,6 @@ fn two_processes_do_not_share_a_folder() {
     assert_eq!(bench.run(&["--out", "shared"]).0, 0);
 }
 
-#[test]
-fn steps_without_number_are_refused() {
-    let bench = Bench::new();
-    for (arguments, steps) in
-        [(["--step", "1e-9"], "3000000000 steps"), (["--stop", "1e12"], "1000000000000 steps")]
-    {
-        let message = bench.refusal(&arguments);
-        assert!(message.contains(steps) && message.contains("too many"), "{message}");
-        assert!(!bench.path("out").exists());
-    }
-}
-
 #[cfg(target_os = "linux")]
 #[test]
 fn standard_error_that_cannot_be_written_ends_no_run() {
@@ -233,15 +208,4 @@ fn a_reader_that_goes_away_is_no_failure() {
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0));
     assert!(output.stderr.is_empty());
-}
-
-#[test]
-fn nothing_is_left_in_the_temporary_folder() {
-    let bench = Bench::new();
-    let temporary = bench.path("tmp with space");
-    fs::create_dir(&temporary).unwrap();
-    let status =
-        bench.command(&["run", "loop.toml", "--quiet"]).env("TMPDIR", &temporary).status().unwrap();
-    assert!(status.success());
-    assert_eq!(fs::read_dir(&temporary).unwrap().count(), 0);
 }

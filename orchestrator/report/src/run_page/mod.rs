@@ -271,17 +271,4 @@ mod tests {
             (format!("{within} attitude lost at 3 s."), vec![])
         );
     }
-
-    #[test]
-    fn what_is_beyond_its_limit_stands_out_in_the_summary() {
-        let summary = |is_within| {
-            let run = Recording { summary: vec![line("rate", is_within)], ..Recording::default() };
-            super::summary(&[run]).into_string()
-        };
-        assert!(summary(Some(false)).contains("class=\"bad\""));
-        assert!(
-            !summary(Some(true)).contains("class=\"bad\"")
-                && !summary(None).contains("class=\"bad\"")
-        );
-    }
 }

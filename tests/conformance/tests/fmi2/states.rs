@@ -9,11 +9,12 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// Parameters with which an FMU has states of other kinds: none, surfaces and sensors, a delay, and
-/// a table.
-fn preparations(fmu: &Fmu) -> &'static [fn(&Instance)] {
+/// Parameters with which an instance has states of other kinds: none, a table, surfaces and sensors,
+/// and a delay, which works in co-simulation only.
+fn preparations(fmu: &Fmu, fmu_type: i32) -> &'static [fn(&Instance)] {
     const ALL: [fn(&Instance); 4] = [
         |_| (),
+        tabulate,
         |instance| {
             let reference = instance.fmu.reference("sensor.set");
             ok!(instance, fmi2SetInteger(&reference, 1, &2));
@@ -23,9 +24,12 @@ fn preparations(fmu: &Fmu) -> &'static [fn(&Instance)] {
             let reference = instance.fmu.reference("actuation.delay");
             instance.ok(instance.set_real(reference, 0.1));
         },
-        tabulate,
     ];
-    if fmu.name() == "ReentryPlant" { &ALL } else { &ALL[..1] }
+    match (fmu.name(), fmu_type) {
+        ("ReentryPlant", CO_SIMULATION) => &ALL,
+        ("ReentryPlant", _) => &ALL[..3],
+        _ => &ALL[..1],
+    }
 }
 
 /// Returns an instance in the middle of a simulation.
@@ -42,7 +46,7 @@ fn running(fmu: &Fmu, fmu_type: i32, prepare: fn(&Instance)) -> Instance {
 fn handles_and_bytes_bring_back_the_same_future() {
     for (fmu, fmu_type) in fmus_and_interfaces() {
         let (drive, mut futures) = (driver(fmu_type), Vec::new());
-        for &prepare in preparations(&fmu) {
+        for &prepare in preparations(&fmu, fmu_type) {
             let instance = running(&fmu, fmu_type, prepare);
             let (mut handle, bytes) = (instance.save(), instance.serialize());
             let expected = drive(&instance, 4..12);
@@ -268,7 +272,7 @@ const FORGERIES: usize = 6000;
 #[test]
 fn forged_states_neither_hang_nor_panic() {
     for fmu in fmus() {
-        for &prepare in preparations(&fmu) {
+        for &prepare in preparations(&fmu, CO_SIMULATION) {
             let doing = Arc::new(Mutex::new(String::new()));
             let (done, finished) = channel();
             let (name, fmu, shared) = (fmu.name().to_owned(), fmu.clone(), doing.clone());

@@ -87,38 +87,6 @@ fn frame(svg: &str) -> Vec<f64> {
 }
 
 #[test]
-fn a_name_beyond_all_measure_is_shortened() {
-    let name = "x".repeat(200);
-    let svg = text(&figure(vec![curve(&name, Shape::Line)], None));
-    // A script still finds its curve by the whole name.
-    let short = format!(">{}…{}<", "x".repeat(50), "x".repeat(49));
-    assert!(svg.contains(&short) && svg.contains(&name), "{svg}");
-}
-
-#[test]
-fn a_long_title_is_wrapped_and_makes_room_for_itself() {
-    let titled = |title: &str| {
-        text(&Figure { title: title.into(), ..figure(vec![curve("c", Shape::Line)], None) })
-    };
-    let (short, long) = (titled("short"), titled(&["a long run"; 20].join(", ")));
-    let lines = long.matches("<text class=\"title\"").count();
-    assert_eq!((short.matches("<text class=\"title\"").count(), lines), (1, 3));
-    assert_eq!(frame(&long)[1], frame(&short)[1] + 2.0 * TITLE_LINE);
-}
-
-#[test]
-fn a_long_label_is_wrapped_and_keeps_its_unit() {
-    let labelled = |label: &str| {
-        let mut figure = figure(vec![curve("c", Shape::Line)], None);
-        figure.panels[0].y_label = label.into();
-        text(&figure)
-    };
-    let svg = labelled("norm(plant.rate.p, plant.rate.q, plant.rate.r), deg/s");
-    assert!(text_with(&svg, ">norm(plant.rate.p,").contains("rotate(-90)"), "{svg}");
-    assert!(text_with(&svg, "plant.rate.r), deg/s<").contains("rotate(-90)"), "{svg}");
-}
-
-#[test]
 fn long_marks_have_exponents_and_push_the_axes_aside() {
     let scaled = |scale: f64| {
         let mut curve = curve("c", Shape::Line);
@@ -167,20 +135,6 @@ fn a_name_stands_where_no_curve_crosses_it() {
     let (_, rest) = text_with(&svg, ">limit of all</text>").split_once(" x=\"").unwrap();
     let right: f64 = rest.split('"').next().unwrap().parse().unwrap();
     assert!((64.0..64.0 + 461.0).contains(&right), "{right}");
-}
-
-#[test]
-fn a_legend_of_each_panel_stands_between_its_title_and_its_axes() {
-    let mut figure = figure(vec![curve("first", Shape::Line)], None);
-    figure.legend = Legend::Each;
-    figure.columns = 2;
-    figure.panels.push(Panel { height: Some(330.0), ..figure.panels[0].clone() });
-    figure.panels.push(figure.panels[0].clone());
-    let svg = text(&figure);
-    assert_eq!(svg.matches("class=\"entry\"").count(), 3);
-    // The row is as high as its highest panel, and has a line for the legend.
-    assert!(svg.contains(&format!("height=\"{}\"", 34.0 + 330.0 + 22.0 + 250.0 + 22.0)), "{svg}");
-    assert_eq!(frame(&svg)[1], 34.0 + 10.0 + 18.0 + 22.0);
 }
 
 #[test]
