@@ -10,7 +10,6 @@ use control::allocation::pwpf::{Modulator, Pwpf};
 use control::allocation::{
     AllocationStatus, Allocator, Command, JetCommand, Memory, Method, Settings,
 };
-use control::error::DesignError;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 use vehicle::effectors::{EffectorFault, EffectorFaultKind, Effectors, SURFACES};
@@ -296,31 +295,6 @@ fn jets_switch_between_allocations() {
     // The dead band of the modulator reduces the moment: the jet fires less than its commanded duty
     // cycle.
     assert!(mean.z > 0.5 * commanded.moment.z && mean.z < commanded.moment.z, "{mean}");
-}
-
-#[test]
-fn settings_that_cannot_work_are_refused_by_name() {
-    type Change<'a> = &'a dyn Fn(&mut Settings);
-    let refusal = |change: Change| {
-        let mut settings = Settings::published();
-        change(&mut settings);
-        Allocator::new(settings)
-            .err()
-            .map_or_else(String::new, |error: DesignError| error.to_string())
-    };
-    let cases: [(Change, &str); 7] = [
-        (&|s| s.period = 0.0, "period"),
-        (&|s| s.period = 0.0105, "pwpf.period"),
-        (&|s| s.weight_moment.y = 0.0, "weight.moment[2]"),
-        (&|s| s.weight_jet = -1.0, "weight.jet"),
-        (&|s| s.weight_surface = f64::NAN, "weight.surface"),
-        (&|s| s.pwpf.off = 0.45, "pwpf.off"),
-        (&|s| s.pwpf.on = 4.5, "pwpf.on"),
-    ];
-    for (change, name) in cases {
-        let text = refusal(change);
-        assert!(text.contains(name), "{name}: {text}");
-    }
 }
 
 /// Largest multiple of a moment that effectors can give, by a linear program in their commands.

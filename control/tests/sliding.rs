@@ -326,25 +326,3 @@ fn the_moment_of_a_tick_does_not_depend_on_the_moment_achieved_before_it() {
     assert_eq!(one, two);
     assert_ne!(memory, other, "but its consequences do");
 }
-
-#[test]
-fn settings_that_cannot_work_are_refused_by_name() {
-    let refusal = |settings: Settings<BoundaryLayer>| Tvsmc::new(settings).unwrap_err().to_string();
-    let good = Settings::btvsmc_do();
-    let text = refusal(Settings { period: 0.0, ..good });
-    assert!(text.contains("period.feedback"), "{text}");
-    let text = refusal(Settings { period: 0.5, ..good });
-    assert!(text.contains("boundaryLayer.h"), "{text}");
-    let text = refusal(Settings { surface: Surface { lambda: -1.0, ..good.surface }, ..good });
-    assert!(text.contains("surface.lambda") && text.contains("-1"), "{text}");
-    let observer =
-        good.observer.map(|observer| Observer { l: [0.005, f64::NAN, 0.01], ..observer });
-    let text = refusal(Settings { observer, ..good });
-    assert!(text.contains("observer.L[2]"), "{text}");
-    let text =
-        Fbl::new(FblSettings { kd: -3.0, ..FblSettings::published() }).unwrap_err().to_string();
-    assert!(text.contains("gain.d"), "{text}");
-    let text =
-        Fbl::new(FblSettings { period: 1.0, ..FblSettings::published() }).unwrap_err().to_string();
-    assert!(text.contains("spectral radius"), "{text}");
-}

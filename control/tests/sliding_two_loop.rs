@@ -298,27 +298,6 @@ fn the_inner_sliding_variable_stays_in_its_layer_from_the_least_accepted_gain_on
 }
 
 #[test]
-fn settings_that_cannot_work_are_refused_by_name() {
-    let ours = TwoLoopSettings::ours();
-    let refusal = |settings: TwoLoopSettings| TwoLoopSmc::new(settings).unwrap_err().to_string();
-    let mut weak = ours;
-    weak.inner.layer.rho[0] = 0.3;
-    let text = refusal(weak);
-    assert!(text.contains("inner.rho[1] = 0.3 must exceed 0.3086"), "{text}");
-    assert!(text.contains("|I⁻¹ M_d| = 0.1835"), "{text}");
-    let mut flat = ours;
-    flat.outer.layer.b[1] = 1.0;
-    let text = refusal(flat);
-    assert!(text.contains("outer.b[2] = 1"), "{text}");
-    let text = refusal(TwoLoopSettings { period: 0.1, ..ours });
-    assert!(text.contains("inner.rho"), "{text}");
-    let text = refusal(TwoLoopSettings { filter: -1.0, ..ours });
-    assert!(text.contains("commandFilter.frequency"), "{text}");
-    let text = refusal(TwoLoopSettings { disturbance: [1e5, f64::NAN, 1e5], ..ours });
-    assert!(text.contains("disturbanceMoment.bound[2]"), "{text}");
-}
-
-#[test]
 fn the_filter_follows_a_smooth_reference_without_lag() {
     let settings = TwoLoopSettings::ours();
     let mut controller = TwoLoopSmc::new(settings).unwrap();

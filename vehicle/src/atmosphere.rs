@@ -284,15 +284,4 @@ mod tests {
             (0..=120).map(|km| air(f64::from(km) * 1e3).unwrap().density).collect();
         assert!(densities.windows(2).all(|pair| pair[0] > pair[1]));
     }
-
-    #[test]
-    fn what_lies_outside_is_refused_by_name() {
-        for altitude in [-1.0, TOP + 1.0, f64::NAN] {
-            assert!(air(altitude).unwrap_err().to_string().contains("flight.altitude"));
-        }
-        for mach in [-0.1, f64::NAN, f64::INFINITY] {
-            let refusal = Flight { altitude: 0.0, mach }.dynamic_pressure().unwrap_err();
-            assert!(refusal.to_string().contains("flight.mach"));
-        }
-    }
 }

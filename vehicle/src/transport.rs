@@ -130,23 +130,6 @@ mod tests {
     }
 
     #[test]
-    fn commands_act_after_the_delay_and_nothing_before_them() {
-        let mut transport = transport(0.1);
-        for k in 0..100 {
-            let time = 0.04 * f64::from(k);
-            transport.command(time, pitch(f64::from(k + 1))).unwrap();
-            for (offset, arrived) in [(0.0, k - 3), (0.019, k - 3), (0.021, k - 2), (0.039, k - 2)]
-            {
-                let expected = f64::from((arrived + 1).max(0));
-                assert_eq!(transport.moment(time + offset).y, expected, "{k}, {offset}");
-            }
-            let next = 0.04 * f64::from((k - 2).max(0)) + 0.1;
-            assert!((transport.next_arrival(time).unwrap() - next).abs() < 1e-12);
-            assert!(transport.changes.len() <= 4);
-        }
-    }
-
-    #[test]
     fn ticks_that_differ_by_rounding_are_one() {
         let mut transport = transport(0.12);
         let (mut commanded, mut expected) = (0.0, 0.0);

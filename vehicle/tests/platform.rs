@@ -5,7 +5,6 @@ use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 use vehicle::kinematics::Kinematics;
-use vehicle::plant::Plant;
 use vehicle::platform::{Pose, Surroundings, body_from_velocity, velocity_from_level};
 use vehicle::scenario::Scenario;
 use vehicle::sensor_data::SensorData;
@@ -150,11 +149,4 @@ fn in_two_minutes_the_calibration_sequence_sees_every_direction_within_13_degree
             .fold(1.0, f64::min);
         assert!(farthest > 13f64.to_radians().cos(), "{} deg", farthest.acos().to_degrees());
     }
-}
-
-#[test]
-fn gravity_that_points_up_is_refused_by_name() {
-    let mut config = Scenario::crmpc2022().config(0.01);
-    config.surroundings.gravity = -1.0;
-    assert!(Plant::new(&config, 0.0).unwrap_err().to_string().contains("sensor.gravity"));
 }

@@ -56,14 +56,6 @@ fn oracle_derivatives_of_every_profile_against_differences() {
 }
 
 #[test]
-fn step_keeps_the_value_before_at_its_time() {
-    let profile = Profile::step(Vector3::zeros(), Vector3::repeat(1.0), 5.0);
-    assert_eq!(profile.at(5.0).angles, Vector3::zeros());
-    assert_eq!(profile.at(5.01).angles, Vector3::repeat(1.0));
-    assert_eq!(profile.jumps().collect::<Vec<_>>(), [5.0]);
-}
-
-#[test]
 fn oracle_sine_has_its_phase_and_amplitude() {
     let (mean, amplitude) = (Vector3::new(0.1, 0.2, 0.3), Vector3::new(1.0, -2.0, 3.0));
     let at = Profile::sine(mean, amplitude, 0.8, 0.3).at(2.5);

@@ -132,33 +132,6 @@ fn oracle_off_the_nominal_motion_the_input_changes_by_k_times_the_deviation() {
 }
 
 #[test]
-fn shortcuts_change_nothing_along_a_run() {
-    for constraints in [Constraints::Robust, Constraints::Paper] {
-        let settings = settings(constraints);
-        let [mut with, mut without] = [true, false].map(|shortcuts| {
-            let solver = SolverSettings { shortcuts, ..settings.solver };
-            Crmpc::new(Settings { solver, ..settings }).unwrap()
-        });
-        let limit = settings.limit_moment;
-        let mut counts = [0, 0];
-        for sample in optimisations(constraints).iter().step_by(3) {
-            let (memory, moment) = sample.update(&mut with);
-            let (whole, moment_whole) = sample.update(&mut without);
-            counts[usize::from(memory.report.status == SolverStatus::Constrained)] += 1;
-            let (cost, cost_whole) = (memory.report.cost, whole.report.cost);
-            let tick = sample.tick;
-            assert!(
-                (cost - cost_whole).abs() <= 1e-7 * cost_whole,
-                "tick {tick}: {cost} {cost_whole}"
-            );
-            let difference = (moment - moment_whole).norm() / limit;
-            assert!(difference < 1e-4, "tick {tick}: {difference}");
-        }
-        assert!(counts.iter().all(|&count| count > 1), "{constraints:?}: {counts:?}");
-    }
-}
-
-#[test]
 fn oracle_without_a_disturbance_bound_all_solvers_agree_however_the_plan_begins() {
     let measured =
         Measurement { angles: Scenario::crmpc2022().initial_angles, ..Measurement::default() };

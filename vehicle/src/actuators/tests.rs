@@ -98,19 +98,6 @@ fn jets_switch_at_one_half_or_scale_their_thrust_by_the_duty_cycle() {
 }
 
 #[test]
-fn aerodynamics_and_density_biases_multiply() {
-    let command = surfaces([-5.0, -3.0, -5.0, -3.0, 5.0, 3.0, 0.0, 0.0]);
-    let moment = |pressure: f64, scale: f64| {
-        let actuators = biased(JetMode::OnOff, pressure, scale);
-        let drive = actuators.commanded(0.0, &command, &Surfaces::zeros());
-        actuators.moment(&drive, &command.surfaces, &FIXED)
-    };
-    let (nominal, biased) = (moment(1.0, 1.0), moment(0.9, 0.8));
-    assert!(nominal.amin() > 500.0);
-    assert!((biased - nominal * 0.72).amax() < 1e-9);
-}
-
-#[test]
 fn a_surface_that_fails_stays_floats_or_is_slow_and_a_jet_stays_on_or_off() {
     use EffectorFaultKind::{Floating, JetOff, JetOn, Slow, Stuck};
     let command = Command { jets: Jets::repeat(0.6), ..surfaces([-20.0; SURFACES]) };

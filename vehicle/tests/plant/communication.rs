@@ -31,20 +31,6 @@ fn one_long_step_equals_five_short_ones_bit_for_bit() {
 }
 
 #[test]
-fn one_long_step_equals_five_short_ones_if_the_disturbance_cuts_elsewhere() {
-    for config in kinds() {
-        for (long, short) in long_and_short_steps(&config) {
-            assert!(
-                (long - short).amax() < 1e-11,
-                "{:?}: {}",
-                config.disturbance.kind,
-                long - short
-            );
-        }
-    }
-}
-
-#[test]
 fn a_clock_that_is_accumulated_makes_no_slivers() {
     let config = config();
     let [mut exact, mut accumulated] = [0, 1].map(|_| Plant::new(&config, 0.0).unwrap());

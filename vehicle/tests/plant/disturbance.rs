@@ -1,6 +1,6 @@
 //! The disturbance over time: square waves, tables, and values held from tick to tick.
 
-use super::{config, moment, table, undisturbed};
+use super::{config, moment, undisturbed};
 use nalgebra::{Vector3, Vector6};
 use vehicle::disturbance::{Disturbance, DisturbanceKind, DisturbanceTable, Row};
 use vehicle::plant::{Config, Plant};
@@ -74,38 +74,6 @@ fn oracle_a_table_gives_the_parabolas_of_its_rows_whatever_the_communication_ste
         }
         assert!((plant.angles().x - alpha).abs() < 1e-14, "{steps}: {}", plant.angles().x - alpha);
         assert!((plant.rates().y - rate).abs() < 1e-15, "{steps}: {}", plant.rates().y - rate);
-    }
-}
-
-#[test]
-fn communication_points_at_the_jumps_of_a_table_change_nothing() {
-    let plant = || {
-        disturbed(Disturbance {
-            kind: DisturbanceKind::Table,
-            table: table(),
-            ..Disturbance::default()
-        })
-    };
-    let [mut between, mut at_jumps] = [0, 1].map(|_| plant());
-    let jumps = (0..4).flat_map(|repetition| {
-        let begin = 0.5 + f64::from(repetition) * 0.9;
-        [0.0, 0.113, 0.3141, 0.7].map(|time| begin + time)
-    });
-    let mut points: Vec<f64> = (1..=20).map(|k| 0.2 * f64::from(k)).chain(jumps).collect();
-    points.sort_by(f64::total_cmp);
-    points.dedup_by(|next, before| *next - *before < 1e-9);
-    let mut from = 0.0;
-    for k in 0..20 {
-        let end = 0.2 * f64::from(k + 1);
-        between.advance(0.2 * f64::from(k), end, moment(k)).unwrap();
-        for &to in points.iter().filter(|&&point| point <= end) {
-            if to > from {
-                at_jumps.advance(from, to, moment(k)).unwrap();
-                from = to;
-            }
-        }
-        let difference = (between.state - at_jumps.state).amax();
-        assert!(difference < 1e-13, "{difference} at {end} s");
     }
 }
 
