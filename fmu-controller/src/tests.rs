@@ -5,7 +5,6 @@ mod own_vehicle;
 
 use crate::crmpc::CrmpcLaw;
 use crate::dlmpc::DlmpcLaw;
-use crate::tvsmc::Complete;
 use crate::tvsmc::{self, TvsmcLaw};
 use crate::{Btvsmc, BtvsmcDo, Crmpc, Dlmpc, Fbl, Lqr, SotvsmcDo};
 use controller_export::reference::Choice;
@@ -15,8 +14,6 @@ use model_description::ModelDescription;
 use model_description::variable::Causality;
 use nalgebra::Vector3;
 use vehicle::Scenario;
-use vehicle::disturbance::Disturbance;
-use vehicle::plant::{Plant, State};
 use vehicle::reference::Reference;
 
 /// Inputs that stay constant.
@@ -78,23 +75,6 @@ fn descriptions_are_consistent_and_interchangeable() {
         assert!(names(&lqr, Causality::Output).iter().all(|name| outputs.contains(name)));
     }
     assert_ne!(crmpc.guid(), dlmpc.guid());
-}
-
-#[test]
-fn a_tick_evaluated_with_other_inputs_leaves_no_trace() {
-    let mut once: Crmpc = ready(|_| ());
-    let mut twice: Crmpc = ready(|_| ());
-    let angles = once.input.angles;
-    twice.input.angles *= 1.1;
-    twice.calculate(0.0, LastEvent::InputSet).unwrap();
-    let other = twice.output.moment;
-    twice.input.angles = angles;
-    for instance in [&mut once, &mut twice] {
-        instance.calculate(0.0, LastEvent::InputSet).unwrap();
-        step(instance, 0.0, 0.2);
-    }
-    assert_ne!(other, once.output.moment);
-    assert_eq!(once.output.moment, twice.output.moment);
 }
 
 /// Asserts that the moments of every optimisation period are the same, in however many of these
@@ -184,50 +164,6 @@ fn the_achieved_moment_counts_only_if_it_is_used() {
 }
 
 #[test]
-fn sliding_modes_are_scaled_into_the_limit() {
-    let mut instance: SotvsmcDo = ready(|instance: &mut SotvsmcDo| {
-        instance.parameters.saturation = true;
-        instance.parameters.limit_moment = 1e4;
-    });
-    instance.calculate(0.0, LastEvent::InputSet).unwrap();
-    assert!((instance.output.moment.norm() - 1e4).abs() < 1e-6);
-}
-
-/// Returns the states at the ticks of a loop with saturation, from `start` (s). The law knows the
-/// delay (s), and the plant has it.
-fn saturated_loop(start: f64, delay: f64, ticks: u32) -> Vec<State> {
-    let mut instance: Lqr = Lqr::new();
-    (instance.parameters.saturation, instance.parameters.latency.action) = (true, delay);
-    instance.initialize(&Context { start_time: start, ..context() }).unwrap();
-    let mut config = Scenario::crmpc2022().config(0.01);
-    (config.inertia_scale, config.disturbance, config.moment_delay) =
-        (1.0, Disturbance::default(), delay);
-    let mut plant = Plant::new(&config, start).unwrap();
-    let mut go = |k: u32| {
-        let [from, to] = [k, k + 1].map(|k| start + 0.04 * f64::from(k));
-        (instance.input.angles, instance.input.rates) = (plant.angles(), plant.rates());
-        instance.calculate(from, LastEvent::InputSet).unwrap();
-        plant.advance(from, to, instance.output.moment).unwrap();
-        instance.step(from, to, &Held, &mut |text| panic!("{text}")).unwrap();
-        plant.state
-    };
-    (0..ticks).map(&mut go).collect()
-}
-
-#[test]
-fn oracle_a_known_delay_shifts_the_loop_and_does_nothing_else_even_in_saturation() {
-    // The vehicle rests until the first command acts.
-    for periods in [1, 3] {
-        let delay = 0.04 * f64::from(periods);
-        let late = saturated_loop(0.0, delay, 500);
-        let direct = saturated_loop(delay, 0.0, 450);
-        for (late, direct) in late[periods as usize..].iter().zip(&direct) {
-            assert!((late - direct).amax() < 1e-11, "{delay} s");
-        }
-    }
-}
-
-#[test]
 fn a_time_budget_of_any_length_is_accepted() {
     for budget in [1e9, 1e19, 1e300, f64::MAX] {
         let mut crmpc = ready(|crmpc: &mut Crmpc| crmpc.settings.solver.time_budget = budget);
@@ -236,16 +172,6 @@ fn a_time_budget_of_any_length_is_accepted() {
         dlmpc.calculate(0.0, LastEvent::InputSet).unwrap();
         assert!(crmpc.output.moment.norm() > 0.0 && dlmpc.output.moment.norm() > 0.0, "{budget} s");
     }
-}
-
-#[test]
-fn variants_have_an_observer_if_their_published_settings_have_one() {
-    fn agrees<V: tvsmc::Variant>() -> bool {
-        V::published().complete().observer.is_some() == V::OBSERVER
-    }
-    assert!(
-        agrees::<tvsmc::Btvsmc>() && agrees::<tvsmc::BtvsmcDo>() && agrees::<tvsmc::SotvsmcDo>()
-    );
 }
 
 /// The law sees rates relative to the trajectory at its inputs, Wu 2015 (1).

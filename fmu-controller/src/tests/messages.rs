@@ -113,6 +113,7 @@ fn refusals() -> Vec<String> {
             |instance| instance.settings.pwpf.gain = 0.0,
             |instance| instance.settings.pwpf.time_constant = 0.0,
             |instance| instance.settings.pwpf.on = 0.0,
+            |instance| instance.settings.pwpf.on = 4.5,
             |instance| instance.settings.pwpf.off = 1e3,
         ]),
         messages::<AttitudeEstimator>(&[

@@ -8,7 +8,7 @@ use vehicle::disturbance::DisturbanceKind;
 
 #[test]
 fn refusals_name_variables() {
-    let changes: [fn(&mut Parameters); 44] = [
+    let changes: [fn(&mut Parameters); 46] = [
         |p| p.inertia_ratios[0] = 0.0,
         |p| p.inertia_ratios[3] = 82.0,
         |p| p.inertia_ratios[1] = 7.0,
@@ -32,6 +32,7 @@ fn refusals_name_variables() {
         |p| p.waves[0].phase = f64::NAN,
         |p| p.table.used = 9,
         |p| p.table.period = -1.0,
+        |p| p.table.period = 1e-4,
         |p| tabulate(p, 0.0, &[(-1.0, [0.0; 3])]),
         |p| tabulate(p, 0.0, &[(1.0, [0.0; 3]), (1.0, [0.0; 3])]),
         |p| tabulate(p, 2.0, &[(0.0, [0.0; 3]), (1.0, [0.0; 3]), (2.0, [0.0; 3])]),
@@ -52,6 +53,7 @@ fn refusals_name_variables() {
         |p| p.sensing.triads[1].drift.fill(f64::NAN),
         |p| p.sensing.turntable.bandwidth = -1.0,
         |p| p.sensing.turntable.rate = -1.0,
+        |p| p.sensing.turntable.resolution = -1.0,
         |p| (p.sensing.sensor_set, p.sensing.turntable.bandwidth) = (0, 10.0),
     ];
     let refusal = |set: &fn(&mut Parameters)| {
