@@ -210,6 +210,9 @@ impl Experiment {
 
     fn from_source(source: Source) -> Result<Self, Error> {
         let mut experiment: Self = source.read()?;
+        if let (Some(flown), Some(shown)) = (&experiment.vehicle, &mut experiment.observe.vehicle) {
+            shown.take_effectors(&source.beside(Path::new(flown.file.get_ref())));
+        }
         experiment.source = source;
         Ok(experiment)
     }

@@ -2,6 +2,11 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::fs::Metadata;
+use std::path::Path;
+
+/// Largest vehicle's file that is read, in bytes, as by the vehicle itself.
+const LARGEST: u64 = 16_000_000;
 
 /// The section `[observe.vehicle]`: variables by which the page of a run shows the vehicle. Those
 /// that an FMU lacks which the command line put in are left out.
@@ -33,7 +38,42 @@ pub struct Vehicle {
     pub jets: Vec<String>,
 }
 
+/// What a vehicle's file says of its surfaces and jets. Components that read the file check it.
+#[derive(Deserialize)]
+struct Effectors {
+    #[serde(default)]
+    surfaces: Surfaces,
+    #[serde(default)]
+    jets: Jets,
+}
+
+#[derive(Default, Deserialize)]
+struct Surfaces {
+    names: Vec<String>,
+}
+
+#[derive(Default, Deserialize)]
+struct Jets {
+    moment: [Vec<f64>; 3],
+}
+
 impl Vehicle {
+    /// Shows the surfaces and jets of a vehicle's file, by their names there. The name of a shipped
+    /// vehicle, or a file that cannot be read, changes nothing.
+    pub(super) fn take_effectors(&mut self, file: &Path) {
+        let is_fit = |file: &Metadata| file.is_file() && file.len() <= LARGEST;
+        if !std::fs::metadata(file).is_ok_and(|file| is_fit(&file)) {
+            return;
+        }
+        let text = std::fs::read_to_string(file).unwrap_or_default();
+        if let Ok(Effectors { surfaces, jets }) = toml::from_str(&text) {
+            self.deflections.truncate(surfaces.names.len());
+            self.surfaces = surfaces.names;
+            self.flaps = None;
+            self.jets.truncate(jets.moment[0].len());
+        }
+    }
+
     /// Returns the name of the surface at a place among the deflections.
     pub fn surface(&self, place: usize) -> &str {
         let variable = || self.deflections.get(place)?.rsplit('.').next();
