@@ -253,7 +253,7 @@ fn a_file_that_a_text_parameter_names_counts() {
     assert!(flown("1").contains("30 flown now"));
     assert!(flown("1").contains("0 flown now"));
     let again = flown("2");
-    assert!(again.contains("this has changed: file profile.csv (2 parts)"), "{again}");
+    assert!(again.contains("this has changed: file profile.csv (6 parts)"), "{again}");
 }
 
 #[test]
