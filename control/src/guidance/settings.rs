@@ -97,7 +97,7 @@ pub struct Alpha {
     /// Points of the schedule, in the order of their speeds.
     #[setting(name = "", by_column, used_with = "alpha.points >= {#}")]
     pub schedule: [Point; POINTS],
-    /// Largest change of alpha.angle[1] by which the flight ends at the target's altitude although
+    /// Largest change of the first angle by which the flight ends at the target's altitude although
     /// its lift differs from the predicted one.
     #[setting(unit = "rad", min = 0.0, max = 0.5, nominal = 0.1)]
     pub adjustment: f64,
