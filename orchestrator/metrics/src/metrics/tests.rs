@@ -51,6 +51,32 @@ fn feed(meters: &mut Meters, rows: &[[f64; 8]]) {
 }
 
 #[test]
+fn oracle_metrics_by_hand() {
+    let mut meters = meters();
+    feed(
+        &mut meters,
+        &[
+            // The error is (3, 4, 0) rad, with square 25.
+            [3.0, 4.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0],
+            // The error is (0, 0, 1), with square 1.
+            [1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0],
+            // No step begins at the stop time, so this row does not count for the means.
+            [2.0, 2.0, 2.0, 0.0, 0.0, 0.0, 1.2, 2.0],
+        ],
+    );
+    let metrics = meters.metrics();
+    let near = |name: &str, b: f64| {
+        let a = metrics.number(name);
+        assert!((a.unwrap() - b).abs() < 1e-12, "{name}: {a:?} {b}");
+    };
+    near("ems_deg", 13.0_f64.sqrt().to_degrees());
+    near("cms", 0.5_f64.sqrt());
+    assert_eq!(metrics.asked["solves"], Some(Value::Count(2)));
+    assert_eq!(metrics.units["ems_deg"], "deg");
+    assert!(metrics.completed && metrics.samples == 3 && metrics.lost_at.is_none());
+}
+
+#[test]
 fn a_run_is_lost_beyond_its_bound_or_where_the_signal_is_no_number() {
     let row = |alpha: f64| {
         let mut row = [0.0; 8];
