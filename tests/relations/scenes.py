@@ -1,6 +1,7 @@
 """Settings in which some variables act and no experiment has them, with an experiment's inputs."""
 
 ROWS = range(1, 9)
+FAILING = ("tvsmc-2015/allocated", {"effector.fault.kind": "slow", "effector.fault.number": 1})
 TURNING = ("entry/from-120km", {"reference.externalRate.beta": 0.01})
 SCENES = {
     "DLMPC": {"a sideslip angle that is to turn": TURNING},
@@ -15,7 +16,9 @@ SCENES = {
         "a star tracker": ("entry/navigated", {"star.fix": 1, "star.attitude.w": 0.7, "star.attitude.x": 0.7}),
         "a start without a fix": ("entry/navigated", {"gnss.fix": 0}),
     },
+    "ControlAllocator": {"a surface that becomes slow": FAILING},
     "ReentryPlant": {
+        "a surface that becomes slow": FAILING,
         "fixes of a star tracker": ("entry/navigated", {"sensor.star.period": 0.2, "sensor.gnss.period": 0.2}),
         "rotating Earth": ("crmpc-2022/lqr", {"trajectory.earthRate": 7.292115e-5}),
         "air of six rows": ("entry/from-120km", {"air.rows": 6} | {f"air.altitude[{k}]": 117e3 + 500 * k for k in ROWS[:6]} | {f"air.wind.{axis}[{k}]": 9.0 * k for k in ROWS[:6] for axis in ("north", "east")}),

@@ -320,6 +320,14 @@ class Driven:
 
 def places_of(fmu: Fmu, fmus: list[Fmu], found: dict[str, list[Place]]) -> list[Place]:
     """The places of an FMU: its own, those of FMUs with the same inputs, for which it can be exchanged, and scenes."""
+    def entries(name: str, value) -> dict:
+        """The entries of a vector that is set by its name."""
+        names = [other for other in fmu.variables if other.startswith(f"{name}[")] if name not in fmu.variables else []
+        return dict(zip(names, value if isinstance(value, list) else [value] * len(names))) if names else {name: value}
+
+    for place in found[fmu.name]:
+        given = [entries(name, value) for name, value in place.settings.items()]
+        place.settings.update({name: value for entry in given for name, value in entry.items() if name not in place.settings})
     own = found[fmu.name]
     others = [place for other in fmus if other.names("input") == fmu.names("input") for place in found[other.name]]
     exchanged = [place for place in others if place.name not in {place.name for place in own}]
