@@ -275,7 +275,7 @@ def test_the_command_runs_an_experiment_from_any_folder(tmp_path):
 def test_the_command_lists_what_the_package_has(tmp_path):
     done = orchestrator(tmp_path, "list")
     assert done.returncode == 0, done.stderr
-    for line in ("experiments (39)", "studies (8)", "FMUs (13)"):
+    for line in ("experiments (41)", "studies (8)", "FMUs (13)"):
         assert line in done.stdout
     assert "FAULT" not in done.stdout
 
