@@ -84,6 +84,18 @@ def test_oracle_cvode_agrees_with_co_simulation(fmu, duty, kind):
     assert np.abs(found[:, 6:] - expected[:, 6:]).max() < 1e-9
 
 
+@pytest.mark.parametrize("kind", ["stuck", "floating", "slow", "jetOn", "jetOff"])
+def test_oracle_a_failure_within_a_step_is_an_event_of_model_exchange(fmu, kind):
+    plant = fmu("ReentryPlant")
+    failing = {**ACTUATED, "effector.fault.kind": kind, "effector.fault.number": 5, "effector.fault.start": 1.13}
+    healthy, expected = (co_simulated(plant, parameters, commands, 25) for parameters in (ACTUATED, failing))
+    assert np.array_equal(healthy[:6], expected[:6]) and np.abs(healthy - expected).max() > 1e-3
+    options = dict(solver="CVode", relative_tolerance=1e-10, output_interval=0.2, record_events=False)
+    found = columns(exchanged(plant, failing, commands, 25, **options))
+    assert np.abs(found[:, :6] - expected[:, :6]).max() < 3e-7
+    assert np.abs(found[:, 6:] - expected[:, 6:]).max() < 1e-9
+
+
 def test_oracle_euler_comes_to_co_simulation_with_order_one(fmu):
     plant = fmu("ReentryPlant")
     expected = co_simulated(plant, ACTUATED, commands, 25)

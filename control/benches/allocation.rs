@@ -38,7 +38,7 @@ fn allocations(criterion: &mut Criterion) {
             let times: Vec<f64> = (0..REPETITIONS)
                 .map(|_| {
                     after = memory;
-                    allocator.update(&mut after, u64::from(sample), black_box(&command));
+                    allocator.update(&mut after, u64::from(sample), 0.0, black_box(&command));
                     after.report.time * 1e3
                 })
                 .collect();
@@ -64,7 +64,7 @@ fn allocations(criterion: &mut Criterion) {
         criterion.bench_function(name, |bencher| {
             bencher.iter(|| {
                 let mut after = middle;
-                allocator.update(&mut after, 0, black_box(&command(SAMPLES / 2 + 1)));
+                allocator.update(&mut after, 0, 0.0, black_box(&command(SAMPLES / 2 + 1)));
                 after
             });
         });

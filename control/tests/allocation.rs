@@ -34,7 +34,7 @@ fn command(moment: [f64; 3], dynamic_pressure: f64) -> Command {
 fn settled(allocator: &mut Allocator, samples: u64, command: &Command) -> Memory {
     let mut memory = Memory::default();
     for tick in 0..samples {
-        allocator.update(&mut memory, tick, command);
+        allocator.update(&mut memory, tick, 0.0, command);
         assert_eq!(memory.report.status, AllocationStatus::Optimal, "{tick}");
     }
     memory
@@ -72,7 +72,7 @@ fn published_limits_hold_at_every_sample_of_200_random_cases() {
                     command.moment = Vector3::from_fn(|_, _| symmetric(size));
                 }
                 let before = memory;
-                allocator.update(&mut memory, tick, &command);
+                allocator.update(&mut memory, tick, 0.0, &command);
                 let what = format!("case {case}, {method:?}, sample {tick}");
                 assert_eq!(memory.report.status, AllocationStatus::Optimal, "{what}");
                 assert_within_limits(&before, &memory, &what);
@@ -256,7 +256,7 @@ fn without_an_optimum_the_previous_allocation_is_kept_within_the_limits() {
             Allocator::new(Settings { max_iterations: 1, ..settings(method, JetCommand::Duty) })
                 .unwrap();
         let commanded = command([-8e4, 1e5, 2e4], PRESSURE);
-        stopped.update(&mut memory, 0, &commanded);
+        stopped.update(&mut memory, 0, 0.0, &commanded);
         assert_eq!(memory.report.status, AllocationStatus::Fallback);
         assert_eq!((memory.report.fallbacks, memory.duty), (1, before.duty));
         assert_within_limits(&before, &memory, "stopped");
@@ -265,13 +265,13 @@ fn without_an_optimum_the_previous_allocation_is_kept_within_the_limits() {
         }
         for bad in [[f64::NAN, 0.0, 0.0], [f64::INFINITY, 0.0, 0.0], [0.0, 1e300, 0.0]] {
             let before = memory;
-            allocator(method).update(&mut memory, 0, &command(bad, PRESSURE));
+            allocator(method).update(&mut memory, 0, 0.0, &command(bad, PRESSURE));
             assert_within_limits(&before, &memory, "bad");
         }
         let before = memory;
-        allocator(method).update(&mut memory, 0, &command([0.0; 3], f64::NAN));
+        allocator(method).update(&mut memory, 0, 0.0, &command([0.0; 3], f64::NAN));
         assert_within_limits(&before, &memory, "bad");
-        allocator(method).update(&mut memory, 1, &commanded);
+        allocator(method).update(&mut memory, 1, 0.0, &commanded);
         assert_eq!(memory.report.status, AllocationStatus::Optimal, "it recovers");
     }
 }
@@ -286,7 +286,7 @@ fn jets_switch_between_allocations() {
     let mut switched_between = 0;
     for tick in 0..20_000 {
         let before = memory;
-        allocator.update(&mut memory, tick, &commanded);
+        allocator.update(&mut memory, tick, 0.0, &commanded);
         assert!(memory.jets.iter().all(|&jet| jet == 0.0 || jet == 1.0));
         switched_between += u32::from(memory.jets != before.jets && tick % 10 != 0);
         mean += memory.modulated / 20_000.0;
@@ -407,7 +407,7 @@ fn a_failure_that_is_told_is_made_up_for() {
                   ticks: std::ops::Range<u64>,
                   command: &Command| {
         for tick in ticks {
-            allocator.update(memory, tick, command);
+            allocator.update(memory, tick, 0.04 * tick as f64, command);
         }
     };
     for kind in [Stuck, Floating, Slow, JetOn, JetOff] {

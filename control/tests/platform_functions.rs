@@ -75,6 +75,7 @@ fn the_cone_solver_takes_no_exp_log_or_pow_from_the_platform() {
     Allocator::new(allocation::Settings::published()).unwrap().update(
         &mut memory,
         0,
+        0.0,
         &Command { moment, dynamic_pressure: 2859.0, ..Command::default() },
     );
     assert_eq!(memory.report.status, allocation::AllocationStatus::Optimal);

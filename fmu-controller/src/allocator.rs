@@ -107,7 +107,10 @@ impl SampledInstance for AllocatorInstance {
             let text = "flow.mach is 0, but surfaces of vehicle.file have tables over the Mach number: connect flow.mach and flow.alpha";
             return Err(Failure::Error(text.into()));
         }
-        ticks.evaluate_with(command, |memory, tick| allocator.update(memory, tick, &command));
+        let time = ticks.next_time();
+        ticks.evaluate_with(command, |memory, tick| {
+            allocator.update(memory, tick, time, &command);
+        });
         Ok(())
     }
 

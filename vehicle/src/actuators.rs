@@ -117,7 +117,7 @@ impl Actuators {
     pub fn new(config: &Config) -> Result<Self, Error> {
         let scale = config.aerodynamics_scale;
         not_negative("aerodynamics.scale", scale, "")?;
-        config.fault.check().map_err(|Invalid { name, value, problem }| {
+        config.fault.check(&config.effectors).map_err(|Invalid { name, value, problem }| {
             Error::parameter(name, format!("= {value} {problem}"))
         })?;
         let Effectors { min, max, rate, jet_moments, .. } = config.effectors;

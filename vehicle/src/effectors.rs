@@ -75,6 +75,18 @@ impl Effectors {
         self
     }
 
+    /// Returns the number of surfaces: those that a file leaves out come last and have no range.
+    pub fn surfaces(&self) -> usize {
+        let moves = |i: &usize| self.max[*i] > self.min[*i];
+        (0..SURFACES).rev().find(moves).map_or(0, |last| last + 1)
+    }
+
+    /// Returns the number of jets: those that a file leaves out come last and have no moment.
+    pub fn jets(&self) -> usize {
+        let acts = |j: &usize| self.jet_moments.column(*j).amax() > 0.0;
+        (0..JETS).rev().find(acts).map_or(0, |last| last + 1)
+    }
+
     /// Refuses values out of range, also those of restored effectors, which may be corrupt. The
     /// message begins with the key at fault.
     pub(crate) fn check(&self) -> Result<(), String> {

@@ -140,7 +140,7 @@ pub struct Memory {
 /// let mut memory = Memory::default();
 /// let moment = Vector3::new(1e3, -2e3, 5e2);
 /// let command = Command { moment, dynamic_pressure: 7e3, ..Command::default() };
-/// allocator.update(&mut memory, 0, &command);
+/// allocator.update(&mut memory, 0, 0.0, &command);
 /// assert!(memory.residual.norm() < 1.0, "surfaces and jets give the moment: {}", memory.residual);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -215,13 +215,12 @@ impl Allocator {
         self.ratio
     }
 
-    /// Evaluates the tick with number `tick`. An allocation is computed at every [`Self::ratio`]-th
-    /// tick; the jets may switch at each.
-    pub fn update(&mut self, memory: &mut Memory, tick: u64, command: &Command) {
-        let time = tick as f64 * self.period();
-        let has_failed = self.settings.fault.at(time).0 != EffectorFaultKind::None;
-        if let Some(failed) = self.failed.as_mut().filter(|_| has_failed) {
-            return failed.update(memory, tick, command);
+    /// Evaluates the tick with number `tick`, at `time` (s). An allocation is computed at every
+    /// [`Self::ratio`]-th tick; the jets may switch at each.
+    pub fn update(&mut self, memory: &mut Memory, tick: u64, time: f64, command: &Command) {
+        let fault = self.settings.fault.at(time).0;
+        if let Some(failed) = self.failed.as_mut().filter(|_| fault != EffectorFaultKind::None) {
+            return failed.update(memory, tick, time, command);
         }
         let modulated = self.settings.jets == JetCommand::Pwpf;
         if modulated && tick > 0 {
@@ -249,7 +248,8 @@ impl Allocator {
         // Wu 2015, (59) for one period: the range, and the part of it that the rate permits.
         let change = self.settings.effectors.rate * self.settings.period;
         let before = clamp(&memory.surfaces, &self.limits.0, &self.limits.1);
-        let (min, max) = &self.limits(&before);
+        let limits = self.limits(&before);
+        let (min, max) = &limits;
         let mut low = (before - change).sup(min);
         let mut high = (before + change).inf(max);
         let finite = commanded.iter().all(|value| value.is_finite())
@@ -263,7 +263,8 @@ impl Allocator {
             moment -= offset;
         }
         if finite {
-            self.attain(memory, command, (&matrix, &(commanded - moment)), (&low, &high));
+            let in_period = (&matrix, &(commanded - moment));
+            self.attain(memory, command, in_period, (&low, &high), &limits);
         }
         let mut first = 0;
         if finite && self.settings.method == Method::Blending {
@@ -319,18 +320,19 @@ impl Allocator {
     }
 
     /// Finds the moments that can be attained. The model of the surfaces within one period is given:
-    /// its slopes, its moment at zero deflection (N m), and the deflections in reach.
+    /// its slopes, its moment at zero deflection (N m), and the deflections in reach; and the
+    /// smallest and largest deflections.
     fn attain(
         &self,
         memory: &mut Memory,
         command: &Command,
         in_period: (&SMatrix<f64, 3, SURFACES>, &Vector3<f64>),
         reach: (&Surfaces, &Surfaces),
+        (min, max): &(Surfaces, Surfaces),
     ) {
         let effectors = &self.settings.effectors;
         let rests = self.settings.method == Method::Blending
             && command.dynamic_pressure < self.settings.threshold;
-        let (min, max) = &self.limits(&clamp(&memory.surfaces, &self.limits.0, &self.limits.1));
         let at_rest = clamp(&Surfaces::zeros(), min, max);
         let (min, max) = if rests { (&at_rest, &at_rest) } else { (min, max) };
         let reach = if rests { (min, max) } else { reach };

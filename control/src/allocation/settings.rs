@@ -59,8 +59,7 @@ pub struct Settings {
     /// as printed, whose optimum is not unique.
     #[setting(name = "weight.surface", min = 0.0)]
     pub weight_surface: f64,
-    /// A surface or a jet whose failure the allocator knows, from a time after the start of the
-    /// simulation on.
+    /// A surface or a jet whose failure the allocator knows.
     #[setting(name = "effector.fault")]
     pub fault: EffectorFault,
     /// Model of surfaces and jets and of their limits that the allocator uses.
@@ -121,7 +120,7 @@ impl Settings {
     /// Returns an error that names the setting at fault.
     pub(super) fn ratio(&self) -> Result<u64, DesignError> {
         settings::check(self)?;
-        self.fault.check()?;
+        self.fault.check(&self.effectors)?;
         if self.jets == JetCommand::Duty {
             return Ok(1);
         }

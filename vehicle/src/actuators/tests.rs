@@ -130,3 +130,21 @@ fn a_surface_that_fails_stays_floats_or_is_slow_and_a_jet_stays_on_or_off() {
         assert!((degrees(&reached)[2] - end).abs() < 1e-9, "{kind:?}: {}", degrees(&reached)[2]);
     }
 }
+
+#[test]
+fn what_the_vehicle_lacks_cannot_fail() {
+    use EffectorFaultKind::{JetOff, Stuck};
+    let mut effectors = Effectors::published();
+    assert_eq!((effectors.surfaces(), effectors.jets()), (SURFACES, JETS));
+    (effectors.min[7], effectors.max[7]) = (0.0, 0.0);
+    effectors.jet_moments.fill_column(9, 0.0);
+    let check =
+        |kind, number| EffectorFault { kind, number, ..EffectorFault::default() }.check(&effectors);
+    for (kind, count, what) in [(Stuck, 7, "surfaces"), (JetOff, 9, "jets")] {
+        assert!(check(kind, count).is_ok());
+        let said = check(kind, count + 1).unwrap_err().to_string();
+        let expected = format!("must be at most {count}: the vehicle has no more {what}");
+        assert_eq!(said, format!("effector.fault.number = {} {expected}", count + 1));
+    }
+    assert!(check(EffectorFaultKind::None, 10).is_ok());
+}

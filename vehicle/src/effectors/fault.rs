@@ -1,6 +1,6 @@
 //! A surface or a jet that fails.
 
-use super::{JETS, SURFACES};
+use super::{Effectors, JETS};
 use crate::time::tolerance;
 use serde::{Deserialize, Serialize};
 use settings::{Choice, Declared, Invalid};
@@ -61,22 +61,24 @@ impl EffectorFault {
         (comes && self.start.is_finite()).then_some(self.start)
     }
 
-    /// Refuses what no surface or jet can be or do.
+    /// Refuses a surface or a jet that is not among the effectors, and values out of range.
     ///
     /// # Errors
-    /// Names the setting that is out of range.
-    pub fn check(&self) -> Result<(), Invalid> {
-        use EffectorFaultKind::{Floating, Slow, Stuck};
+    /// Names the setting at fault.
+    pub fn check(&self, effectors: &Effectors) -> Result<(), Invalid> {
+        use EffectorFaultKind::{Floating, JetOff, JetOn, Slow, Stuck};
         let named =
             |fault: Invalid| Invalid { name: format!("effector.fault.{}", fault.name), ..fault };
         settings::check(self).map_err(named)?;
-        if matches!(self.kind, Stuck | Floating | Slow) && self.number > SURFACES {
-            return Err(named(Invalid {
-                name: "number".into(),
-                value: self.number as f64,
-                problem: format!("must be at most {SURFACES}, the number of surfaces"),
-            }));
+        let (count, what) = match self.kind {
+            EffectorFaultKind::None => return Ok(()),
+            Stuck | Floating | Slow => (effectors.surfaces(), "surfaces"),
+            JetOn | JetOff => (effectors.jets(), "jets"),
+        };
+        if self.number <= count {
+            return Ok(());
         }
-        Ok(())
+        let problem = format!("must be at most {count}: the vehicle has no more {what}");
+        Err(named(Invalid { name: "number".into(), value: self.number as f64, problem }))
     }
 }
