@@ -2,6 +2,7 @@
 another file."""
 
 import json
+import re
 import shutil
 import subprocess
 
@@ -38,8 +39,15 @@ def test_vehicles_keep_to_their_schema(text):
 
 @pytest.mark.parametrize("name", ["own-vehicle", "orbiter", "capsule"])
 def test_the_examples_fly_to_their_targets(orchestrate, name):
-    finished, out = orchestrate(ENTRY / f"{name}.toml")
+    finished, out = orchestrate(ENTRY / f"{name}.toml", "--page")
     assert finished.returncode == 0 and "WARN" not in finished.stderr, finished.stderr
+    page = (out / "page.html").read_text(encoding="utf-8")
+    data = re.search(r'id="run-data"[^>]*>(.*?)</script>', page, re.DOTALL)
+    shown = json.loads(data[1])["runs"][0]["vehicle"]
+    file = tomllib.loads((ENTRY / f"{name}.toml").read_text(encoding="utf-8"))["vehicle"]["file"]
+    given = tomllib.loads((ENTRY / file).read_text(encoding="utf-8"))
+    assert [surface["name"] for surface in shown["surfaces"]] == given.get("surfaces", {}).get("names", [])
+    assert len(shown["jets"]) == len(given["jets"]["moment"][0])
     metrics = json.loads((out / "metrics.json").read_text())
     assert metrics["completed"] and metrics["range_off_km"] < 5
     assert metrics["worst_limit_ratio"] < 1

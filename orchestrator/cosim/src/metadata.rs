@@ -78,6 +78,8 @@ pub fn metadata(
         "experiment": {
             "file": experiment.source.path.file_name().map(|name| name.to_string_lossy()),
             "text": experiment.source.whole(),
+            // With the surfaces and jets of the vehicle's file, which the text does not hold.
+            "vehicle": experiment.observe.vehicle,
         },
     })
 }

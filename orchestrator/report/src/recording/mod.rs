@@ -8,7 +8,7 @@ pub mod panels;
 pub mod trajectory;
 pub mod watch;
 
-use cosim::experiment::Observe;
+use cosim::experiment::{Observe, Vehicle};
 use cosim::signal::Signal;
 use fmi_master::names;
 use serde::Deserialize;
@@ -101,7 +101,7 @@ impl Recording {
             time,
             recorded: tracks.iter().map(|(name, _)| name.clone()).collect(),
             tracks: tracks.into_iter().collect(),
-            observe: observe(&text("/experiment/text")),
+            observe: observe(&metadata["experiment"]),
             origin: origin(metadata),
             ..Self::default()
         };
@@ -186,14 +186,20 @@ pub fn display_unit(value: &Value) -> (String, f64) {
     (name, value["factor"].as_f64().unwrap_or(1.0))
 }
 
-/// Reads the section `[observe]` from the text of an experiment; it is empty if there is none.
-fn observe(text: &str) -> Observe {
+/// Reads the section `[observe]` from the text of an experiment, with the vehicle as it was shown; it
+/// is empty if there is none.
+fn observe(experiment: &Value) -> Observe {
     #[derive(Default, Deserialize)]
     struct Section {
         #[serde(default)]
         observe: Observe,
     }
-    toml::from_str::<Section>(text).unwrap_or_default().observe
+    let text = experiment["text"].as_str().unwrap_or_default();
+    let Section { mut observe } = toml::from_str(text).unwrap_or_default();
+    if let Ok(vehicle) = serde_json::from_value::<Vehicle>(experiment["vehicle"].clone()) {
+        observe.vehicle = Some(vehicle);
+    }
+    observe
 }
 
 fn origin(metadata: &Value) -> Vec<(String, String)> {
@@ -244,7 +250,10 @@ mod tests {
                 "set": { "limit": 0.1 },
                 "display_units": { "limit": { "name": "deg", "factor": 57.0 } },
             } },
-            "experiment": { "text": "title = \"a loop\"\n[observe]\nsummary = [\"x\"]" },
+            "experiment": {
+                "text": "title = \"a loop\"\n[observe]\nsummary = [\"x\"]\nvehicle = { attitude = [\"a\", \"b\", \"c\"] }",
+                "vehicle": { "attitude": ["a", "b", "c"], "deflections": ["d"], "surfaces": ["own flap"] },
+            },
         });
         let track = |factor, unit: &str, values: &[f64]| Track {
             unit: unit.into(),
@@ -302,7 +311,9 @@ mod tests {
             parameters,
             [parameter("law.limit", "5.7 deg", true), parameter("law.mode", "fast", false)]
         );
-        assert_eq!(recording().observe.summary, ["x"]);
+        let observe = recording().observe;
+        assert_eq!(observe.summary, ["x"]);
+        assert_eq!(observe.vehicle.unwrap().surface(0), "own flap");
     }
 
     #[test]
