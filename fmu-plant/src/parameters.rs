@@ -42,7 +42,7 @@ pub(crate) enum Actuation {
 pub(crate) struct Parameters {
     /// Ratio of the actual {} of the inertia to that of the vehicle.
     #[setting(name = "inertia.ratio", each = INERTIA, min = 0.0, max = 10.0, nominal = 1.0)]
-    pub(crate) inertia_ratios: [f64; 4],
+    pub(crate) inertia_ratios: [f64; 6],
     /// Ratio of the actual to the nominal inertia besides inertia.ratio: 1.05 means 5 % more.
     #[setting(name = "inertia.scale", min = 0.01, max = 100.0, nominal = 1.0)]
     pub(crate) inertia_scale: f64,
@@ -133,11 +133,13 @@ pub(crate) struct Parameters {
 }
 
 /// Names of the entries of the inertia.
-const INERTIA: [Entry; 4] = [
+const INERTIA: [Entry; 6] = [
     (".Ixx", "roll moment"),
     (".Iyy", "pitch moment"),
     (".Izz", "yaw moment"),
     (".Ixz", "product of the roll and yaw axes"),
+    (".Ixy", "product of the roll and pitch axes"),
+    (".Iyz", "product of the pitch and yaw axes"),
 ];
 
 /// Names of the two sinusoids of the disturbance moment.
@@ -215,7 +217,7 @@ impl Default for Parameters {
             scenario.disturbance;
         let wave = |i: usize| sine.waves.get(i).copied().unwrap_or_default();
         Self {
-            inertia_ratios: [1.0; 4],
+            inertia_ratios: [1.0; 6],
             inertia_scale: scenario.inertia_scale,
             initial: Initial::new(scenario.initial_angles, scenario.initial_rates),
             kind,
@@ -311,10 +313,17 @@ impl Parameters {
     #[allow(non_snake_case)]
     pub(crate) fn config(&self, file: Option<&Vehicle>) -> Result<Config, Error> {
         let vehicle = file.unwrap_or_else(|| Vehicle::papers());
-        let Inertia { Ixx, Iyy, Izz, Ixz } = vehicle.inertia;
-        let [xx, yy, zz, xz] = self.inertia_ratios;
+        let Inertia { Ixx, Iyy, Izz, Ixz, Ixy, Iyz } = vehicle.inertia;
+        let [xx, yy, zz, xz, xy, yz] = self.inertia_ratios;
         Ok(Config {
-            inertia: Inertia { Ixx: Ixx * xx, Iyy: Iyy * yy, Izz: Izz * zz, Ixz: Ixz * xz },
+            inertia: Inertia {
+                Ixx: Ixx * xx,
+                Iyy: Iyy * yy,
+                Izz: Izz * zz,
+                Ixz: Ixz * xz,
+                Ixy: Ixy * xy,
+                Iyz: Iyz * yz,
+            },
             inertia_scale: self.inertia_scale,
             initial: state(&self.initial.angles(), &self.initial.rates),
             disturbance: Disturbance {

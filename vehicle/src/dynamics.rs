@@ -8,7 +8,7 @@ use settings::Declared;
 
 /// Moments and products of inertia in the sign convention of Chai 2022 (3): the off-diagonal
 /// entries of the tensor are −I_ij.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 #[serde(deny_unknown_fields)]
 #[allow(non_snake_case)]
 pub struct Inertia {
@@ -24,12 +24,23 @@ pub struct Inertia {
     /// Product of the roll and yaw axes; the inertia tensor contains -Ixz.
     #[setting(name = "Ixz", part, unit = "kg.m2", nominal = 1e6)]
     pub Ixz: f64,
+    /// Product of the roll and pitch axes; the inertia tensor contains -Ixy.
+    #[setting(name = "Ixy", part, unit = "kg.m2", nominal = 1e6)]
+    pub Ixy: f64,
+    /// Product of the pitch and yaw axes; the inertia tensor contains -Iyz.
+    #[setting(name = "Iyz", part, unit = "kg.m2", nominal = 1e6)]
+    pub Iyz: f64,
 }
 
 impl Inertia {
     /// Returns the inertia tensor I, kg m².
+    #[rustfmt::skip]
     pub fn matrix(&self) -> Matrix3<f64> {
-        Matrix3::new(self.Ixx, 0.0, -self.Ixz, 0.0, self.Iyy, 0.0, -self.Ixz, 0.0, self.Izz)
+        Matrix3::new(
+            self.Ixx, -self.Ixy, -self.Ixz,
+            -self.Ixy, self.Iyy, -self.Iyz,
+            -self.Ixz, -self.Iyz, self.Izz,
+        )
     }
 
     /// Returns the rigid body whose inertia is `scale` times this one.
@@ -44,18 +55,27 @@ impl Inertia {
         {
             positive(name, value, " kg m2")?;
         }
+        for (name, value, moments) in [
+            ("inertia.Ixz", self.Ixz, self.Ixx * self.Izz),
+            ("inertia.Ixy", self.Ixy, self.Ixx * self.Iyy),
+            ("inertia.Iyz", self.Iyz, self.Iyy * self.Izz),
+        ] {
+            let bound = moments.sqrt();
+            if value.is_nan() || value.abs() >= bound {
+                let problem = format!(
+                    "= {value} kg m2 leaves no positive definite inertia: its size must be below {bound}"
+                );
+                return refuse(name, problem);
+            }
+        }
+        let all = "inertia.Ixx, inertia.Iyy, inertia.Izz, inertia.Ixz, inertia.Ixy, inertia.Iyz";
         let Some(body) = RigidBody::new(self.matrix() * scale) else {
-            let bound = (self.Ixx * self.Izz).sqrt();
-            let problem = format!(
-                "= {} kg m2 leaves no positive definite inertia: |Ixz| must be below {bound}",
-                self.Ixz
-            );
-            return refuse("inertia.Ixz", problem);
+            return refuse(all, "leave no positive definite inertia".into());
         };
         let principal = self.matrix().symmetric_eigenvalues();
         if 2.0 * principal.max() > principal.sum() {
             let problem = "violate the triangle inequality: no principal moment may exceed the sum of the others";
-            return refuse("inertia.Ixx, inertia.Iyy, inertia.Izz, inertia.Ixz", problem.into());
+            return refuse(all, problem.into());
         }
         Ok(body)
     }

@@ -219,7 +219,7 @@ impl File {
         let segments = self.reference.segment.into_iter().map(FileSegment::into_segment).collect();
         Scenario {
             duration: self.duration,
-            inertia: Inertia { Ixx, Iyy, Izz, Ixz },
+            inertia: Inertia { Ixx, Iyy, Izz, Ixz, ..Inertia::default() },
             inertia_scale: scale,
             flight: self.flight,
             initial_angles: self.initial.angles_deg.map(f64::to_radians),
@@ -318,7 +318,13 @@ mod tests {
         let scenario = Scenario::crmpc2022();
         assert_eq!(
             scenario.inertia,
-            Inertia { Ixx: 588791.0, Iyy: 1303212.0, Izz: 1534163.0, Ixz: 24242.0 }
+            Inertia {
+                Ixx: 588791.0,
+                Iyy: 1303212.0,
+                Izz: 1534163.0,
+                Ixz: 24242.0,
+                ..Inertia::default()
+            }
         );
         assert!(
             (scenario.initial_angles.map(f64::to_degrees) - Vector3::new(7.5, 10.0, -30.0)).amax()

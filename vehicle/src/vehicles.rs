@@ -87,6 +87,12 @@ struct GivenInertia {
     /// Product of the roll and yaw axes; the inertia tensor contains -Ixz.
     #[serde(default, deserialize_with = "given::finite")]
     Ixz: f64,
+    /// Product of the roll and pitch axes; the inertia tensor contains -Ixy.
+    #[serde(default, deserialize_with = "given::finite")]
+    Ixy: f64,
+    /// Product of the pitch and yaw axes; the inertia tensor contains -Iyz.
+    #[serde(default, deserialize_with = "given::finite")]
+    Iyz: f64,
 }
 
 impl Vehicle {
@@ -153,8 +159,8 @@ impl Vehicle {
                 "reference.span and chord are missing, to which moments refer",
             ));
         }
-        let GivenInertia { Ixx, Iyy, Izz, Ixz, .. } = inertia;
-        let inertia = Inertia { Ixx, Iyy, Izz, Ixz };
+        let GivenInertia { Ixx, Iyy, Izz, Ixz, Ixy, Iyz, .. } = inertia;
+        let inertia = Inertia { Ixx, Iyy, Izz, Ixz, Ixy, Iyz };
         inertia.body(1.0).map_err(|error| refuse(None, &error.to_string()))?;
         let mut effectors = Effectors::none();
         let has_effectors = surfaces.is_some() || jets.is_some();

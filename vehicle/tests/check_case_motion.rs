@@ -162,7 +162,7 @@ fn published_a_brick_tumbles_and_is_damped() {
         Ixx: 0.001_894_220 * slug_ft2,
         Iyy: 0.006_211_019 * slug_ft2,
         Izz: 0.007_194_665 * slug_ft2,
-        Ixz: 0.0,
+        ..Inertia::default()
     };
     let body = inertia.body(1.0).unwrap();
     let planet = Planet::EARTH;

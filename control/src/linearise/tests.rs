@@ -5,7 +5,13 @@ use vehicle::dynamics::Inertia;
 use vehicle::kinematics as kin;
 
 fn body() -> RigidBody {
-    let inertia = Inertia { Ixx: 588791.0, Iyy: 1303212.0, Izz: 1534163.0, Ixz: 24242.0 };
+    let inertia = Inertia {
+        Ixx: 588791.0,
+        Iyy: 1303212.0,
+        Izz: 1534163.0,
+        Ixz: 24242.0,
+        ..Inertia::default()
+    };
     RigidBody::new(inertia.matrix()).unwrap()
 }
 

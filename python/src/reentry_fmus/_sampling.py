@@ -38,6 +38,8 @@ ROLES = {
     "Iyy": ("bodyMomentOfInertia_Y", "bodyMomentOfInertia_Pitch", "XIYY", "IYY"),
     "Izz": ("bodyMomentOfInertia_Z", "bodyMomentOfInertia_Yaw", "XIZZ", "IZZ"),
     "Ixz": ("bodyProductOfInertia_ZX", "bodyProductOfInertia_XZ", "XIZX", "IXZ", "IZX"),
+    "Ixy": ("bodyProductOfInertia_XY", "bodyProductOfInertia_YX", "XIXY", "IXY", "IYX"),
+    "Iyz": ("bodyProductOfInertia_YZ", "bodyProductOfInertia_ZY", "XIYZ", "IYZ", "IZY"),
 }
 """Names by which models call what a vehicle needs: first those of AIAA S-119, then usual identifiers."""
 SIDESLIP = 2.0

@@ -29,6 +29,7 @@ ALPHAS = [2.0 * i for i in range(21)]
 """Angles of attack of a model without breakpoints, deg."""
 MACHS = [2.0, 4.0]
 MOST_SURFACES = 8
+INERTIA = ("Ixx", "Iyy", "Izz", "Ixz", "Ixy", "Iyz")
 
 def quoted(text: str) -> str:
     """A basic string of TOML."""
@@ -75,10 +76,9 @@ def convert(sampler: Sampler, grid: Grid, surfaces: dict[str, str], options: arg
     ]
     inertia = options.inertia
     if inertia is None and all(roles.find(role) for role in ("Ixx", "Iyy", "Izz")):
-        others = ["Ixz"] if roles.find("Ixz") else []
-        inertia = [constant(role, "kgm2", None) for role in ["Ixx", "Iyy", "Izz", *others]]
+        inertia = [constant(role, "kgm2", None) if roles.find(role) else 0.0 for role in INERTIA]
     if inertia:
-        values = "".join(f"{name} = {value:.9g}\n" for name, value in zip(("Ixx", "Iyy", "Izz", "Ixz"), inertia, strict=False))
+        values = "".join(f"{name} = {value:.9g}\n" for name, value in zip(INERTIA, inertia, strict=False))
         parts.append(f'[inertia]\nsource = {source}\n{values}')
     static = dict(zip(sampler.axes, sampler.tables(sampler.axes, grid, {}), strict=True))
     forces = sampler.forces(grid)

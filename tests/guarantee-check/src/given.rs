@@ -34,7 +34,13 @@ impl Default for Given {
             limit_rate: law.limit_rate,
             limit_moment: law.limit_moment,
             latency: Latency::default(),
-            inertia: Inertia { Ixx: at(0, 0), Iyy: at(1, 1), Izz: at(2, 2), Ixz: -at(0, 2) },
+            inertia: Inertia {
+                Ixx: at(0, 0),
+                Iyy: at(1, 1),
+                Izz: at(2, 2),
+                Ixz: -at(0, 2),
+                ..Inertia::default()
+            },
             law,
         }
     }

@@ -43,7 +43,7 @@ fn every_bound_holds_with_errors_of_the_measurement() {
 
 #[test]
 fn bounds_of_the_geometry_hold_in_the_widest_domain_and_for_another_vehicle() {
-    let inertia = Inertia { Ixx: 400e3, Iyy: 900e3, Izz: 600e3, Ixz: -150e3 };
+    let inertia = Inertia { Ixx: 400e3, Iyy: 900e3, Izz: 600e3, Ixz: -150e3, ..Inertia::default() };
     let settings = Settings {
         sideslip_domain: 0.799,
         body: inertia.body(1.0).unwrap(),
