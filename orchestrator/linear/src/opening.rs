@@ -6,6 +6,7 @@ use cosim::system::System;
 use fmi_master::clock::Clock;
 use fmi_master::description::Carrier;
 use fmi_master::wiring::{Port, Wire};
+use std::collections::BTreeSet;
 
 /// Input that receives an opened signal.
 pub(crate) struct Receiver {
@@ -103,11 +104,13 @@ fn ports(system: &System, patterns: &[String]) -> Result<Vec<Port>, Error> {
         let found: Vec<Port> =
             meant.filter(|port| port.carrier == Carrier::Real && is_wired(port)).collect();
         if found.is_empty() {
-            let mut names: Vec<String> = Vec::new();
+            let mut groups = BTreeSet::new();
             for port in wires.iter().flat_map(|(wire, _)| [wire.to, wire.from]) {
-                names.push(system.name(port));
+                let name = system.name(port);
+                let group = name.rsplit_once('.').map(|(group, _)| format!("{group}.*"));
+                groups.insert(group.unwrap_or(name));
             }
-            let hint = fmi_master::names::hint(pattern, names.iter().map(String::as_str));
+            let hint = fmi_master::names::hint(pattern, groups.iter().map(String::as_str));
             return Err(Error::experiment(format!(
                 "--open {pattern}: there is no such connected input or output{hint}"
             )));

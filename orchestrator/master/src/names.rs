@@ -24,7 +24,13 @@ pub fn hint<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str> + Clone) -
     if let Some(name) = nearest(wrong, names.clone()) {
         return format!("; did you mean \"{name}\"?");
     }
-    let names: Vec<&str> = names.into_iter().collect();
+    let mut names: Vec<&str> = names.into_iter().collect();
+    if names.len() > LISTED {
+        // Those that begin as the wrong one does are most likely meant.
+        let begins_alike =
+            |name: &&str| name.bytes().zip(wrong.bytes()).take_while(|(a, b)| a == b).count();
+        names.sort_by_key(|name| std::cmp::Reverse(begins_alike(name)));
+    }
     match names.len() {
         0 => "; there are none".into(),
         n if n <= LISTED => format!("; there are: {}", names.join(", ")),
