@@ -37,6 +37,9 @@ impl Panel {
     }
 
     fn resolve(requested: &experiment::Panel, system: &mut System) -> Result<Self, String> {
+        if requested.optional && requested.paths().any(|path| !system.has(path)) {
+            return Ok(Self::default());
+        }
         let units = system.experiment.observe.units.clone();
         let mut resolve = |signal: &Signal| {
             if system.lost_by_exchange(signal.paths()) {

@@ -6,6 +6,7 @@ use fmi_master::names;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::iter;
 use toml::Spanned;
 
 /// The section `[observe]` of an experiment: the signals of a run that are measured, watched and
@@ -231,6 +232,18 @@ pub struct Panel {
     pub curves: Vec<Curve>,
     /// Limit of the norm of all curves.
     pub limit: Option<Signal>,
+    /// Whether the FMUs may lack what it draws.
+    #[serde(default)]
+    pub optional: bool,
+}
+
+impl Panel {
+    /// Returns the variables that the panel draws.
+    pub fn paths(&self) -> impl Iterator<Item = &str> {
+        let curves = self.curves.iter();
+        let signals = curves.flat_map(|curve| iter::once(&curve.of).chain(&curve.reference));
+        signals.chain(&self.limit).flat_map(Signal::paths)
+    }
 }
 
 /// A curve of a panel.

@@ -54,6 +54,9 @@ fn of_experiment(
 ) -> Result<Panel, String> {
     let label = if asked.label.is_empty() { &asked.name } else { &asked.label };
     let mut panel = Panel { label: label.clone(), ..Panel::default() };
+    if asked.optional && asked.curves.iter().any(|curve| run.series(&curve.of).is_err()) {
+        return Ok(panel);
+    }
     let mut unit: Option<String> = None;
     let mut drawn = |signal: &Signal| {
         let Series { unit: other, mut values } = run.series(signal).ok()?;

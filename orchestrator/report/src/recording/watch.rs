@@ -18,6 +18,8 @@ use std::path::Path;
 const RECORD: &str = "[record]";
 /// Place that names the variables of a guarantee, which an FMU may lack.
 const GUARANTEE: &str = "[observe.guarantee]";
+/// Place that names the variables of panels that an FMU may lack.
+const OPTIONAL: &str = "optional [[observe.panels]]";
 
 /// An observer that keeps the variables that the pictures of a run show.
 pub struct Watch {
@@ -44,7 +46,8 @@ impl Watch {
         named.retain(|name, _| !unasked.contains(name));
         let named = unasked.into_iter().map(|name| (name, RECORD)).chain(named);
         for (name, place) in named {
-            let is_optional = place == GUARANTEE || system.lost_by_exchange([name.as_str()]);
+            let is_optional =
+                [GUARANTEE, OPTIONAL].contains(&place) || system.lost_by_exchange([name.as_str()]);
             if !system.has(&name) && is_optional {
                 continue;
             }
@@ -119,10 +122,9 @@ fn plan(system: &System) -> impl Iterator<Item = String> {
 fn names(observe: &Observe) -> BTreeMap<String, &'static str> {
     let mut names = BTreeMap::new();
     for panel in &observe.panels {
-        let curves = panel.curves.iter();
-        let signals = curves.flat_map(|curve| iter::once(&curve.of).chain(&curve.reference));
-        for path in signals.chain(&panel.limit).flat_map(Signal::paths) {
-            names.insert(path.to_string(), "[[observe.panels]]");
+        let place = if panel.optional { OPTIONAL } else { "[[observe.panels]]" };
+        for path in panel.paths() {
+            names.entry(path.to_string()).or_insert(place);
         }
     }
     for (_, path) in observe.vehicle.iter().flat_map(Vehicle::paths) {

@@ -51,6 +51,10 @@ fn oracle_the_panel_of_an_experiment_with_the_norm_and_its_limit() {
     assert_eq!(panels[0].curves[2].values, [5.0, 1.0]);
     assert_eq!(panels[0].limits, [Limit { value: 5.0, runs: vec![0] }]);
     assert_eq!(panels[0].unit, "deg/s");
+    // An optional one is there with all its curves, or not at all.
+    let optional = PANELS.replace("limit =", "optional = true, limit =");
+    let drawn = of_experiments(&[run("a", &SIGNALS, &optional)]).unwrap();
+    assert!(drawn.iter().all(|panel| panel.label != "rate"));
 }
 
 #[test]
