@@ -77,6 +77,9 @@ const ALWAYS: [&str; 6] =
 /// Metrics of every run that depend on the machine.
 const OF_THE_MACHINE: [&str; 2] = ["real_time_factor", "wall_s"];
 
+/// Metrics that are texts.
+const TEXTS: [&str; 2] = ["guarantee_status", "guarantee_unfounded"];
+
 /// Further names in `metrics.json`, which hold more than one number.
 const GROUPS: [&str; 2] = ["step_us", "real_time"];
 
@@ -94,10 +97,12 @@ impl Metrics {
             .collect()
     }
 
-    /// Returns the names of the metrics that depend on the experiment alone and not on the machine.
+    /// Returns the names of the metrics that are numbers, and depend on the experiment alone and
+    /// not on the machine.
     pub fn reproducible_names(observe: &Observe) -> Vec<String> {
         let mut names = Self::names(observe);
-        names.retain(|name| !OF_THE_MACHINE.contains(&name.as_str()));
+        let left_out: Vec<&str> = OF_THE_MACHINE.into_iter().chain(TEXTS).collect();
+        names.retain(|name| !left_out.contains(&name.as_str()));
         names
     }
 
