@@ -96,25 +96,6 @@ def test_oracle_a_failure_within_a_step_is_an_event_of_model_exchange(fmu, kind)
     assert np.abs(found[:, 6:] - expected[:, 6:]).max() < 1e-9
 
 
-def test_oracle_euler_comes_to_co_simulation_with_order_one(fmu):
-    plant = fmu("ReentryPlant")
-    expected = co_simulated(plant, ACTUATED, commands, 25)
-
-    def error(step: float) -> float:
-        # FMPy's Euler method integrates in steps of the output interval and looks at the event
-        # indicators after each, so a deflection moves on for up to a step.
-        result = exchanged(plant, ACTUATED, commands, 25, solver="Euler", step_size=step, output_interval=step)
-        at_ticks = np.isclose(result["time"] / 0.2, np.round(result["time"] / 0.2))
-        last = {round(row["time"] / 0.2): row for row in result[at_ticks]}
-        found = np.array([list(last[tick])[1:] for tick in range(26)])
-        return np.abs(found - expected).max()
-
-    errors = [error(0.02 / parts) for parts in (1, 4, 16)]
-    assert errors[0] < 5e-3
-    for coarse, fine in zip(errors, errors[1:]):
-        assert coarse / fine == pytest.approx(4.0, abs=0.2)
-
-
 def test_published_arrivals_are_located_by_cvode(fmu):
     # Wu 2015, (63): the commands are beyond the limits, at a limit and within them; every surface
     # that moves does so at 10 deg/s.

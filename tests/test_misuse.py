@@ -76,16 +76,6 @@ def test_designs_that_cannot_work_are_refused_at_initialization(fmu, name, setti
         drive(instance.start())
 
 
-def test_a_plant_at_a_singular_attitude_says_so(fmu):
-    with Instance(fmu("ReentryPlant"), {"disturbance.kind": "none", "initial.alpha": math.pi / 2, "initial.beta": 1.5, "initial.p": 0.5}) as plant:
-        with refuses(plant, "beta"):
-            plant.start()
-            for tick in range(50):
-                plant.step(tick * STEP, STEP)
-        plant.reset()
-        drive(plant.start())
-
-
 def test_measurements_without_sense_do_not_end_a_controller(fmu):
     """At a state far from anything feasible the controller counts a fallback with a finite moment,
     and recovers."""

@@ -41,12 +41,6 @@ def test_oracle_figures_of_merit_follow_from_the_recorded_trajectory(experiment,
     assert found["max_moment_ratio"] == pytest.approx(moment.max(), rel=1e-12)
 
 
-def test_runs_repeat_bit_for_bit(experiment, orchestrate):
-    finished, out = orchestrate(EXPERIMENTS / "crmpc-robust.toml")
-    assert finished.returncode == 0
-    assert (out / "results.csv").read_bytes() == (experiment("crmpc-robust") / "results.csv").read_bytes()
-
-
 def test_a_vector_is_set_as_a_whole(orchestrate):
     short = [EXPERIMENTS / "lqr.toml", "--stop", "1"]
     given = ["--set", "controller.weight.P=50", "--set", "controller.weight.P[2]=60", "--set", "controller.weight.Q=[1, 2, 3]"]

@@ -44,31 +44,6 @@ def test_oracle_first_moment(fmu, name):
     np.testing.assert_allclose(moment, INERTIA @ np.linalg.solve(kinematics(32 * DEG, 2 * DEG), v), rtol=1e-10)
 
 
-@pytest.mark.parametrize("name", ["BTVSMC", "BTVSMC_DO", "SOTVSMC_DO"])
-def test_the_moment_does_not_depend_on_the_achieved_one_at_the_same_instant(fmu, name):
-    """There is no algebraic loop with actuators that answer at once, and none is declared."""
-    controller = fmu(name)
-    outputs = {variable.name: variable for variable in controller.description.modelVariables}
-    dependencies = {
-        unknown.variable.name: [dependency.name for dependency in unknown.dependencies or []]
-        for unknown in controller.description.outputs
-    }
-    assert not any("achievedMoment" in other for name in MOMENT for other in dependencies[name])
-    assert "achievedMoment.used" in outputs
-    with Instance(controller, BODY | {"reference.profile": "tvsmc2015", "achievedMoment.used": True}) as driven:
-        driven.start(inputs=START)
-        driven.step(0.0, 0.01)
-        driven.set(START)
-        first = driven.get(MOMENT)
-        driven.set({f"achievedMoment.{axis}": 1e5 for axis in "xyz"})
-        assert driven.get(MOMENT) == first
-        driven.step(0.01, 0.01)
-        assert driven.get(MOMENT) == first
-        driven.set(START)
-        later = driven.get(MOMENT)
-    assert later != first
-
-
 def test_gains_against_condition_46_are_refused(fmu):
     with Instance(fmu("SOTVSMC_DO"), {"reaching.k2[2]": 0.5}) as instance:
         instance.enter()

@@ -1,4 +1,4 @@
-"""Saved states in another process, another instance and a closed loop, all bit for bit. Reset, restored states and
+"""Saved states in another process, bit for bit. Reset, restored states and
 instances side by side are tested in tests/conformance."""
 
 import json
@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from conftest import NAMES
-from fmi import ANGLES, MOMENT, RATES, Instance, Loop
+from fmi import ANGLES, MOMENT, RATES, Instance
 
 STEP = 0.04
 PLANT = {"inertia.scale": 1.05, "disturbance.kind": "white", "disturbance.seed": 3}
@@ -59,37 +59,3 @@ def test_a_state_saved_to_a_file_goes_on_in_a_new_process(fmu, name, tmp_path):
     finished = subprocess.run([sys.executable, program, *arguments], capture_output=True, text=True, timeout=120)
     assert finished.returncode == 0, finished.stderr
     assert [json.loads(line) for line in finished.stdout.splitlines()] == expected
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_new_instance_takes_the_parameters_from_the_state(fmu, name):
-    with Instance(fmu(name), SETTINGS[name]).start(inputs=inputs(name, 0)) as instance:
-        drive(instance, range(7))
-        saved = instance.save()
-        expected = drive(instance, range(7, 30))
-    with Instance(fmu(name)).start() as other:
-        other.restore(saved)
-        assert drive(other, range(7, 30)) == expected
-
-
-def test_a_closed_loop_goes_on_from_saved_states(fmu):
-    loop = Loop(Instance(fmu("CRMPC"), SETTINGS["CRMPC"]), Instance(fmu("ReentryPlant"), PLANT), STEP)
-    loop.start()
-    for _ in range(62):
-        loop.advance()
-    saved, tick = (loop.controller.save(), loop.plant.save()), loop.tick
-
-    def go_on() -> list:
-        rows = []
-        for _ in range(125):
-            loop.advance()
-            rows.append(loop.plant.outputs() + loop.controller.outputs())
-        return rows
-
-    expected = go_on()
-    loop.controller.restore(saved[0])
-    loop.plant.restore(saved[1])
-    loop.tick = tick
-    assert go_on() == expected
-    loop.controller.close()
-    loop.plant.close()

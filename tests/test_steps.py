@@ -79,32 +79,6 @@ def test_outputs_are_held_between_ticks_and_follow_inputs_at_a_tick(fmu, name):
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
-def test_input_derivatives_give_the_inputs_between(fmu, name):
-    names = ANGLES + RATES
-    value = np.array([0.13, 0.16, -0.5, 0.01, -0.02, 0.0])
-    slope = np.array([0.02, -0.04, 0.01, 0.002, 0.001, -0.003])
-    references = [fmu(name).variables[n].valueReference for n in names]
-
-    def ramp(time: float) -> dict:
-        return dict(zip(names, value + slope * time))
-
-    with Instance(fmu(name)).start(inputs=ramp(0.0)) as fine:
-        for tick in range(25):
-            fine.set(ramp(tick * FEEDBACK))
-            fine.step(tick * FEEDBACK, FEEDBACK)
-        fine.set(ramp(1.0))
-        expected = fine.get(MOMENT)
-    with Instance(fmu(name)).start(inputs=ramp(0.0)) as coarse:
-        for k in range(5):
-            coarse.set(ramp(k * HOLD))
-            coarse.slave.setRealInputDerivatives(references, [1] * 6, slope)
-            coarse.step(k * HOLD, HOLD)
-        coarse.set(ramp(1.0))
-        found = coarse.get(MOMENT)
-    np.testing.assert_allclose(found, expected, rtol=1e-6)
-
-
-@pytest.mark.parametrize("name", CONTROLLERS)
 def test_a_constant_external_reference_is_the_constant_profile(fmu, name):
     angles = [0.16, 0.01, -0.45]
     constant = {f"reference.angle.{axis}": value for axis, value in zip(("alpha", "beta", "sigma"), angles)}
