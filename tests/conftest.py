@@ -11,11 +11,17 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import importers
 from browsing import ARGUMENTS, CHROMIUM
 from fmi import Fmu
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 ROOT = Path(__file__).resolve().parent.parent
 # The tests import what scripts/yardsticks and the examples run.
@@ -145,9 +151,21 @@ def fmu3(tmp_path_factory):
     return cache(lambda name: Fmu.open(archive3(name), tmp_path_factory.mktemp(name)))
 
 
+def call(*arguments: object, code: int | None = 0, **options) -> subprocess.CompletedProcess:
+    """Runs the orchestrator, which must end with this exit code if one is given."""
+    done = subprocess.run([program("orchestrator"), *arguments], capture_output=True, text=True, timeout=300, **options)
+    assert code in (None, done.returncode), done.stdout + done.stderr
+    return done
+
+
 def merged(experiment: Path) -> str:
     """An experiment with all that it extends, as one text that can stand in any folder."""
-    return subprocess.run([program("orchestrator"), "show", experiment], capture_output=True, text=True, check=True).stdout
+    return call("show", experiment).stdout
+
+
+def results(folder: Path, name: str = "results.csv") -> pd.DataFrame:
+    """The recorded rows of a run, to the last bit, by the names of the variables without their units."""
+    return pd.read_csv(folder / name, float_precision="round_trip").rename(columns=lambda name: name.split(" ")[0])
 
 
 @pytest.fixture(scope="session")

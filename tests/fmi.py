@@ -47,6 +47,10 @@ class Fmu:
         items = self.variables[name].declaredType.items
         return next(int(item.value) for item in items if item.name == text)
 
+    def values(self, settings: dict) -> dict:
+        """Settings with the values of enumerations in place of their items."""
+        return {name: self.item(name, value) if isinstance(value, str) else value for name, value in settings.items()}
+
     def arguments(self, kind: str = "coSimulation") -> dict:
         identifier = getattr(self.description, kind).modelIdentifier
         return dict(guid=self.description.guid, unzipDirectory=str(self.folder), modelIdentifier=identifier)

@@ -6,7 +6,6 @@ from __future__ import annotations
 import base64
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +15,8 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page
 
 from browsing import in_chromium
-from conftest import ROOT, program
+from conftest import ROOT, program, tomllib
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 PAGE = ROOT / "out" / "browser" / "index.html"
 # The controllers that the page offers: those of the studies.

@@ -1,12 +1,11 @@
 """The campaigns of orchestrator/experiments/campaigns, each with every controller that it is for."""
 
 import json
-import subprocess
 
 import pandas
 import pytest
 
-from conftest import EXPERIMENTS, TARGET, program
+from conftest import EXPERIMENTS, TARGET, call
 
 CAMPAIGNS = EXPERIMENTS.parent / "campaigns"
 CONTROLLERS = ["crmpc-robust", "crmpc-paper", "dlmpc-tuned", "lqr"]
@@ -17,10 +16,7 @@ FMUS = ["CRMPC", "DLMPC", "LQR", "FBL", "BTVSMC", "BTVSMC_DO", "SOTVSMC_DO", "Tw
 
 
 def orchestrator(*arguments, folder) -> str:
-    command = [program("orchestrator"), *arguments, "--fmu-dir", TARGET / "fmu"]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=folder, timeout=300)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    return call(*arguments, "--fmu-dir", TARGET / "fmu", cwd=folder).stdout
 
 
 def check(campaign, arguments, folder):

@@ -2,19 +2,14 @@
 exist."""
 
 import re
-import sys
 import xml.etree.ElementTree as ET
 import zipfile
 
 import pytest
 
 import named
-from conftest import ROOT, TARGET
+from conftest import ROOT, TARGET, tomllib
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 
 def tables(page: str) -> list[tuple[list[str], list[list[str]]]]:

@@ -2,7 +2,6 @@
 accuracy, lost and frozen samples."""
 
 import numpy as np
-import pytest
 
 from fmi import ANGLES, RATES, Instance
 
@@ -39,15 +38,3 @@ def test_oracle_attitude_and_rates_at_rest(fmu):
     rms = np.sqrt(np.mean(errors**2, axis=0))
     assert np.linalg.norm(rms[:3]) < 0.2, rms
     assert np.all(rms[3:] < 0.1), rms
-
-
-def test_ideal_sensors_unplugged_and_plugged_in(fmu, tmp_path):
-    """Without a line, the start values of the inputs give the scenario's start; with the plant's
-    true readings the estimate is the truth."""
-    with Instance(fmu("AttitudeEstimator")).start() as instance:
-        assert np.degrees(instance.get(ANGLES)) == pytest.approx([7.5, 10.0, -30.0], abs=1e-9)
-        assert instance.get(["health"]) == [health(fmu, "ok")]
-    file = tmp_path / "unfiltered.toml"
-    file.write_text("filter.cutoff = 0.0")
-    found, true = flown(fmu, {"sensor.set": 0, "initial.q": 0.02}, {"settings.file": str(file)}, 500, ANGLES)
-    assert np.degrees(np.abs(found - true)).max() < 0.01

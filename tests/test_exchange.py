@@ -1,19 +1,22 @@
 """ReentryPlant as model exchange, under FMPy's CVode and in the orchestrator, against its own
-co-simulation. For surfaces and jets see test_actuators.py."""
+co-simulation, also with surfaces and jets."""
 
-import subprocess
 from ctypes import c_double
+from functools import partial
 
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
 from fmpy.fmi2 import FMU2Model
 
-from conftest import EXPERIMENTS, TARGET, program
+from conftest import EXPERIMENTS, TARGET, call, results
 from fmi import ANGLES, MOMENT, RATES, Instance
 
 STOP = 20.0
 STEP = 0.04
+MOTION = ANGLES + RATES
+DEFLECTION = [f"deflection[{i}]" for i in range(1, 9)]
+JET = [f"jet[{j}]" for j in range(1, 11)]
 # Bound on the difference between CVode and our integrator, rad and rad/s, over a swing of about
 # one.
 BOUND = 3e-7
@@ -22,9 +25,9 @@ AMPLITUDE = np.array([2e4, 3e4, -4e4])
 FREQUENCY = np.array([0.5, 0.7, 0.9])
 
 
-def moment(tick: int) -> np.ndarray:
+def forces(tick: int) -> dict[str, float]:
     """Piecewise constant moment, so that both interfaces see exactly the same input."""
-    return AMPLITUDE * np.sin(FREQUENCY * tick * STEP)
+    return dict(zip(MOMENT, AMPLITUDE * np.sin(FREQUENCY * tick * STEP)))
 
 
 # Jumps at times that are no communication points.
@@ -49,43 +52,36 @@ def settings(request):
     return {"inertia.scale": 1.05, "disturbance.kind": request.param, "disturbance.seed": 7, **table}
 
 
-def co_simulated(fmu, settings) -> np.ndarray:
+def co_simulated(fmu, settings: dict, at=forces, step: float = STEP, ticks: int = round(STOP / STEP), names=MOTION) -> np.ndarray:
+    """These outputs at every tick of co-simulation with piecewise constant inputs."""
     rows = []
-    with Instance(fmu, settings).start(inputs=dict(zip(MOMENT, moment(0)))) as plant:
-        for tick in range(round(STOP / STEP) + 1):
-            plant.set(dict(zip(MOMENT, moment(tick))))
-            rows.append(plant.get(ANGLES + RATES))
-            if tick * STEP < STOP - STEP / 2:
-                plant.step(tick * STEP, STEP)
+    with Instance(fmu, settings).start(inputs=at(0)) as plant:
+        for tick in range(ticks + 1):
+            plant.set(at(tick))
+            rows.append(plant.get(names))
+            if tick < ticks:
+                plant.step(tick * step, step)
     return np.array(rows)
 
 
-def exchanged(fmu, settings) -> np.ndarray:
-    # The input jumps at each tick: one row has the old value and one the new, which FMPy takes for
-    # an event.
-    rows = []
-    for tick in range(round(STOP / STEP) + 1):
-        if tick > 0:
-            rows.append((tick * STEP, *moment(tick - 1)))
-        rows.append((tick * STEP, *moment(tick)))
-    signal = np.array(rows, dtype=[("time", float), *((name, float) for name in MOMENT)])
-    values = {
-        name: fmu.item(name, value) if isinstance(value, str) else value for name, value in settings.items()
-    }
+def exchanged(fmu, settings: dict, at=forces, step: float = STEP, ticks: int = round(STOP / STEP), names=MOTION) -> np.ndarray:
+    """The same by FMPy's CVode. The inputs jump at each tick: one row has the old values and one the new, which FMPy takes
+    for an event."""
+    rows = [(tick * step, *at(row).values()) for tick in range(ticks + 1) for row in ((tick - 1, tick) if tick else (0,))]
     result = simulate_fmu(
         str(fmu.path),
         fmi_type="ModelExchange",
         solver="CVode",
         relative_tolerance=1e-10,
-        start_values=values,
-        input=signal,
-        stop_time=STOP,
-        output_interval=STEP,
-        output=ANGLES + RATES,
+        start_values=fmu.values(settings),
+        input=np.array(rows, dtype=[(name, float) for name in ("time", *at(0))]),
+        stop_time=ticks * step,
+        output_interval=step,
+        output=names,
         record_events=False,
     )
-    np.testing.assert_allclose(result["time"], STEP * np.arange(len(result)), atol=1e-9)
-    return np.array([result[name] for name in ANGLES + RATES]).T
+    np.testing.assert_allclose(result["time"], step * np.arange(ticks + 1), atol=1e-9)
+    return np.array([result[name] for name in names]).T
 
 
 @pytest.mark.importer("FMPy", "model exchange, CVode", fmu="ReentryPlant", within=BOUND, to="our co-simulation")
@@ -97,14 +93,50 @@ def test_oracle_cvode_agrees_with_co_simulation(fmu, settings):
     assert np.abs(found - expected).max() < BOUND
 
 
+# With surfaces and jets. Commands are beyond their limits of rate and position.
+ACTUATED = {"actuation": "surfacesAndJets", "disturbance.kind": "none", "initial.alpha": 0.1, "initial.beta": 0.0, "initial.sigma": 0.2}
+
+
+def commands(tick: int, jets: float = 1.0) -> dict[str, float]:
+    wanted = [np.radians(12 * np.sin(0.18 * tick + i) - (6 if i < 4 else 0)) for i in range(8)]
+    surfaces = {f"surface[{i}]": value for i, value in enumerate(wanted, 1)}
+    return surfaces | {jet: jets * ((tick * 7 + 3 * j) % 10 < 3) for j, jet in enumerate(JET)}
+
+
+ACTUATING = {"step": 0.2, "ticks": 25, "names": MOTION + DEFLECTION}
+
+
+def assert_same_actuation(found: np.ndarray, expected: np.ndarray) -> None:
+    assert np.abs(found[:, :6] - expected[:, :6]).max() < BOUND
+    assert np.abs(found[:, 6:] - expected[:, 6:]).max() < 1e-9
+
+
+@pytest.mark.parametrize("duty", [False, True])
+@pytest.mark.parametrize("kind", ["none", "square", "againstMoment"])
+def test_oracle_cvode_agrees_with_co_simulation_under_surfaces_and_jets(fmu, duty, kind):
+    plant, settings = fmu("ReentryPlant"), {**ACTUATED, "jets.duty": duty, "disturbance.kind": kind}
+    at = partial(commands, jets=0.7 if duty else 1.0)
+    expected = co_simulated(plant, settings, at, **ACTUATING)
+    assert np.ptp(expected[:, :3], axis=0).min() > 0.02
+    assert_same_actuation(exchanged(plant, settings, at, **ACTUATING), expected)
+
+
+@pytest.mark.parametrize("kind", ["stuck", "floating", "slow", "jetOn", "jetOff"])
+def test_oracle_a_failure_within_a_step_is_an_event_of_model_exchange(fmu, kind):
+    plant = fmu("ReentryPlant")
+    failing = {**ACTUATED, "effector.fault.kind": kind, "effector.fault.number": 5, "effector.fault.start": 1.13}
+    healthy, expected = (co_simulated(plant, settings, commands, **ACTUATING) for settings in (ACTUATED, failing))
+    assert np.array_equal(healthy[:6], expected[:6]) and np.abs(healthy - expected).max() > 1e-3
+    assert_same_actuation(exchanged(plant, failing, commands, **ACTUATING), expected)
+
+
 @pytest.mark.parametrize("kinematics", ["printed", "exact"])
 def test_oracle_directional_derivatives_are_central_differences(fmu, kinematics):
     plant = fmu("ReentryPlant")
     derivatives = [v for v in plant.variables.values() if v.derivative is not None]
     states = [v.derivative for v in derivatives]
-    deflections = [f"deflection[{i}]" for i in range(1, 9)]
     motion = [name for name in plant.names("output") if name.startswith("motion.")]
-    assert [v.name for v in states] == ANGLES + RATES + deflections + motion
+    assert [v.name for v in states] == MOTION + DEFLECTION + motion
     loads = MOMENT + [f"disturbanceMoment.{axis}" for axis in "xyz"]
     trajectory = [name for name in plant.names("input") if name.startswith("trajectory.")]
     assert len(trajectory) == 7
@@ -149,7 +181,7 @@ def test_oracle_euler_converges_to_co_simulation_with_order_one(fmu):
     with Instance(vehicle, {"disturbance.kind": "none", **start}).start() as plant:
         for tick in range(100):
             plant.step(tick * STEP, STEP)
-        expected = np.array(plant.get(ANGLES + RATES))
+        expected = np.array(plant.get(MOTION))
 
     def error(step: float) -> float:
         # FMPy's Euler method integrates in steps of the output interval.
@@ -161,7 +193,7 @@ def test_oracle_euler_converges_to_co_simulation_with_order_one(fmu):
             stop_time=100 * STEP,
             step_size=step,
             output_interval=step,
-            output=ANGLES + RATES,
+            output=MOTION,
         )
         return np.abs(np.array(list(result[-1]))[1:] - expected).max()
 
@@ -179,9 +211,9 @@ def flown(folder, settings, *lines, fmus="fmu", isolate="false") -> np.ndarray:
     recorded = '["plant.attitude.*", "plant.rate.*"]'
     text += ["[components.plant.parameters]", '"integrator.step" = 0.001', *values, "[record]", f"variables = {recorded}"]
     (folder / "exchange.toml").write_text("\n".join(text), encoding="utf-8")
-    command = [program("orchestrator"), "run", folder / "exchange.toml", "--stop", "10", "--quiet", "--force", f"--isolate={isolate}"]
-    subprocess.run([*command, "--out", folder / "out", "--fmu-dir", TARGET / fmus], check=True)
-    return np.loadtxt(folder / "out" / "results.csv", delimiter=",", skiprows=1)
+    command = ["run", folder / "exchange.toml", "--stop", "10", "--quiet", "--force", f"--isolate={isolate}"]
+    call(*command, "--out", folder / "out", "--fmu-dir", TARGET / fmus)
+    return results(folder / "out").to_numpy()
 
 
 @pytest.mark.importer("orchestrator", "model exchange", fmu="ReentryPlant", within=1e-9, to="our co-simulation")

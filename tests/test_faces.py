@@ -7,7 +7,6 @@ The page for browsers flies each of its controllers with the orchestrator's bits
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import subprocess
@@ -18,12 +17,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conftest import ROOT, TARGET, merged, program
+from conftest import ROOT, TARGET, call, program
+from conftest import results as recorded
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 FOLDER = ROOT / "orchestrator" / "experiments"
 STOP = 0.4
@@ -48,8 +44,7 @@ for path, out, stop in json.load(sys.stdin):
 
 
 def listed() -> list[Path]:
-    command = [program("orchestrator"), "list", "--json", FOLDER]
-    rows = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    rows = json.loads(call("list", "--json", FOLDER).stdout)
     assert not [row for row in rows if row["fault"]]
     return [Path(row["path"]) for row in rows if row["kind"] == "experiment"]
 
@@ -132,8 +127,6 @@ def test_every_direct_loop_is_stepped_in_python_with_the_same_bits(flown):
             assert kept["loop"].tobytes() == kept["run"].tobytes(), path
         # The package has read the files that the program has written.
         name = path.parent.relative_to(flown / "package")
-        with open(flown / "program" / name / "results.csv", newline="") as file:
-            rows = list(csv.DictReader(file))
+        rows = recorded(flown / "program" / name)
         with np.load(path) as kept:
-            for column, values in zip(kept["names"], kept["run"].T, strict=True):
-                assert [float(row[column]) for row in rows] == values.tolist(), (path, column)
+            assert (rows[list(kept["names"])].to_numpy() == kept["run"]).all(), path

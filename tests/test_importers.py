@@ -5,7 +5,6 @@ The tests marked `importer` make the table of docs/use-it.md (conftest.py). Each
 two arrays to `agree`, the importer's and ours.
 """
 
-import csv
 import os
 import shutil
 import subprocess
@@ -18,7 +17,7 @@ from fmpy import simulate_fmu
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.validation import validate_fmu
 
-from conftest import NAMES, ROOT, TARGET, archive, example, program
+from conftest import NAMES, ROOT, TARGET, archive, call, example, results
 from fmi import ANGLES, MOMENT, NOT_REPRODUCIBLE, RATES, Fmu, Instance, Loop, of_step
 
 STEP = 0.04
@@ -130,24 +129,8 @@ def orchestrate(folder, text, *arguments, fmus="fmu"):
     """Runs the orchestrator with the FMUs of a folder in `target`, and returns the columns of the
     results by component and variable name."""
     (folder / "experiment.toml").write_text(text)
-    command = [program("orchestrator"), "run", "experiment.toml", "--out", "out", "--fmu-dir", TARGET / fmus, "--force", "--quiet"]
-    done = subprocess.run([*command, *arguments], capture_output=True, text=True, timeout=60, cwd=folder)
-    assert done.returncode == 0, done.stderr
-    return columns(folder / "out" / "results.csv")
-
-
-def columns(path) -> dict[str, np.ndarray]:
-    with open(path, newline="") as file:
-        rows = list(csv.reader(file))
-    kept = [i for i, cell in enumerate(rows[-1]) if number(cell)]
-    return {rows[0][i].split(" ")[0]: np.array([float(row[i]) for row in rows[1:]]) for i in kept}
-
-
-def number(cell) -> bool:
-    try:
-        return bool(cell) and float(cell) is not None
-    except ValueError:
-        return False
+    call("run", "experiment.toml", "--out", "out", "--fmu-dir", TARGET / fmus, "--force", "--quiet", *arguments, cwd=folder)
+    return results(folder / "out")
 
 
 @pytest.fixture(scope="session")
@@ -165,9 +148,7 @@ def packed(tmp_path):
 
     def pack(name):
         (tmp_path / "experiment.toml").write_text(EXPERIMENT.format(name, STOP, STEP))
-        command = [program("orchestrator"), "pack", "experiment.toml", "--out", "loop.ssp", "--fmu-dir", TARGET / "fmu"]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=tmp_path)
-        assert done.returncode == 0, done.stderr
+        call("pack", "experiment.toml", "--out", "loop.ssp", "--fmu-dir", TARGET / "fmu", cwd=tmp_path)
         return tmp_path / "loop.ssp"
 
     return pack
@@ -237,7 +218,7 @@ def fmi_rs(folder, *arguments):
     command = [example("fmi_rs"), *arguments, str(STEP), str(STOP), folder / "out.csv"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
-    return columns(folder / "out.csv")
+    return results(folder, "out.csv")
 
 
 def fmi_sim(folder, *arguments):
@@ -248,7 +229,7 @@ def fmi_sim(folder, *arguments):
     command += ["--step", str(STEP), "--output-interval", str(STEP)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stdout + done.stderr
-    return columns(folder / "out.csv")
+    return results(folder, "out.csv")
 
 
 # The plant as model exchange; test_exchange.py has the comparison under CVode.

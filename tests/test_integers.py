@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from conftest import EXPERIMENTS, TARGET, program
+from conftest import EXPERIMENTS, TARGET, call
 
 LQR = EXPERIMENTS / "lqr.toml"
 SHORT = f"title = 'short'\nextends = '{LQR.as_posix()}'\n[simulation]\nstop = 0.04\n"
@@ -25,8 +25,7 @@ BEYOND = [2**31, -(2**31) - 1, 2**32 + 7, 2**53, -1]
 
 def orchestrate(folder: Path, *arguments: object) -> subprocess.CompletedProcess:
     (folder / "short.toml").write_text(SHORT)
-    command = [program("orchestrator"), *arguments, "--fmu-dir", TARGET / "fmu", "--quiet"]
-    return subprocess.run(command, capture_output=True, text=True, cwd=folder)
+    return call(*arguments, "--fmu-dir", TARGET / "fmu", "--quiet", code=None, cwd=folder)
 
 
 def by_option(folder: Path, number: int):
@@ -39,9 +38,8 @@ def by_experiment(folder: Path, number: int):
 
 
 def by_ssp(folder: Path, number: int):
-    pack = [program("orchestrator"), "pack", LQR, "--fmu-dir", TARGET / "fmu", "--out", folder / "seven.ssp"]
-    pack += ["--stop", "0.04", "--set", "plant.disturbance.seed=7"]
-    subprocess.run(pack, check=True, capture_output=True)
+    pack = ["pack", LQR, "--fmu-dir", TARGET / "fmu", "--out", folder / "seven.ssp"]
+    call(*pack, "--stop", "0.04", "--set", "plant.disturbance.seed=7")
     with zipfile.ZipFile(folder / "seven.ssp") as old, zipfile.ZipFile(folder / "other.ssp", "w") as new:
         for name in old.namelist():
             content = old.read(name)

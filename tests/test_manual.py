@@ -15,14 +15,10 @@ from xml.etree import ElementTree
 import pytest
 
 from browsing import ARGUMENTS, CHROMIUM, in_chromium
-from conftest import NAMES, ROOT, TARGET
+from conftest import NAMES, ROOT, TARGET, tomllib
 
 pytestmark = pytest.mark.tier("manual")
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 SITE = TARGET / "manual"
 CHAPTERS = tomllib.loads((ROOT / "docs" / "site" / "chapters.toml").read_text())["part"]

@@ -13,6 +13,7 @@ import pytest
 import slycot
 from scipy.optimize import brentq
 
+import conftest
 import margins_in_flight
 from conftest import EXPERIMENTS, TARGET, program
 
@@ -58,8 +59,7 @@ def settings(attitude, delay: float, scale: float = 1.0, start: float = 0.0) -> 
 
 
 def call(*arguments) -> str:
-    command = [program("orchestrator"), *arguments, "--fmu-dir", TARGET / "fmu"]
-    return subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
+    return conftest.call(*arguments, "--fmu-dir", TARGET / "fmu").stdout
 
 
 def margins(law: str, attitude, delay: float = 0.0) -> dict:

@@ -1,6 +1,6 @@
 """Bad input gives an FMI error that names the culprit in the log; the process stays alive, and the
 instance is usable again after a reset. What every FMU refuses in the same way, as calls, pointers and
-references, is tested in tests/conformance."""
+references, is tested in tests/conformance, and every message in the tests of the FMUs' crates."""
 
 import math
 
@@ -40,20 +40,12 @@ def refuses(instance: Instance, *words: str):
     [
         # This case is marginal: at this rate the spectral radius is exactly one (docs/errata.md).
         ("CRMPC", {"feedback.k1": -10.0, "feedback.k2": -10.0, "period.feedback": 0.2}, ["spectral radius", "-10"]),
-        ("CRMPC", {"feedback.k1": -60.0, "feedback.k2": -60.0}, ["spectral radius", "-60"]),
-        ("CRMPC", {"period.optimisation": 0.21}, ["period.optimisation", "period.feedback"]),
-        ("CRMPC", {"limit.rate": 1e-4, "constraints": "paper"}, ["x_tube"]),
         ("DLMPC", {"slidingMode.q": 50.0}, ["slidingMode.q", "50"]),
-        ("DLMPC", {"period.feedback": 0.03}, ["period.optimisation", "period.feedback"]),
         ("LQR", {"weight.P[1]": 1e7, "weight.P[4]": 1e7}, ["spectral radius"]),
         ("LQR", {"reference.profile": "table", "reference.file": "nowhere.csv"}, ["nowhere.csv"]),
         ("CRMPC", {"vehicle.file": "no-such"}, ["vehicle.file: no-such"]),
-        ("ReentryPlant", {"inertia.ratio.Iyy": 7.0}, ["inertia.Iyy"]),
-        ("ControlAllocator", {"period": 0.0105}, ["period", "pwpf.period"]),
-        ("ControlAllocator", {"pwpf.on": 5.0}, ["pwpf.on"]),
         ("ControlAllocator", {"weight.moment[2]": 0.0}, ["weight.moment[2]"]),
         ("AttitudeEstimator", {"settings.file": "filter.cutoff = 50.0"}, ["filter.cutoff"]),
-        ("AttitudeEstimator", {"settings.file": "lost.after = 0.0"}, ["lost.after"]),
         ("EntryGuidance", {"settings.file": "shaping.bankRate = 0.0"}, ["shaping.bankRate"]),
         ("EntryGuidance", {"settings.file": "shaping.bank = 1.0"}, ["settings.file", "shaping.bank: there is no such setting"]),
         ("EntryGuidance", {"settings.file": "limit.load = 1.0"}, ["limit.load is a variable"]),

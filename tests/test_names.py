@@ -7,11 +7,10 @@ import json
 import re
 import shlex
 import subprocess
-import tomllib
 
 import pytest
 
-from conftest import EXPERIMENTS, ROOT, TARGET, program
+from conftest import EXPERIMENTS, ROOT, TARGET, program, tomllib
 
 # Commands that take minutes, and those that write outside the folder.
 LONG = ("reproduce", "campaign white", "--worst", "~", "/usr")

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from conftest import EXPERIMENTS, merged
+from conftest import EXPERIMENTS, merged, results
 
 
 def metrics(folder) -> dict:
@@ -25,15 +25,10 @@ def changed(tmp_path, old: str, new: str, name: str = "crmpc-robust"):
 @pytest.mark.parametrize("name", ["crmpc-robust", "lqr"])
 def test_oracle_figures_of_merit_follow_from_the_recorded_trajectory(experiment, name):
     found = metrics(experiment(name))
-    data = np.genfromtxt(experiment(name) / "results.csv", delimiter=",", names=True, deletechars="")
-
-    def vector(*names):
-        return np.array([data[name] for name in names]).T
-
-    axes = ("alpha", "beta", "sigma")
-    error = vector(*(f"plant.attitude.{a}" for a in axes)) - vector(*(f"controller.reference.{a}" for a in axes))
-    moment = np.linalg.norm(vector(*(f"controller.moment.{a}" for a in "xyz")), axis=1) / 1.356e5
-    rate = np.linalg.norm(vector(*(f"plant.rate.{a}" for a in "pqr")), axis=1)
+    data, axes = results(experiment(name)), ("alpha", "beta", "sigma")
+    error = data[[f"plant.attitude.{a}" for a in axes]].to_numpy() - data[[f"controller.reference.{a}" for a in axes]].to_numpy()
+    moment = np.linalg.norm(data[[f"controller.moment.{a}" for a in "xyz"]], axis=1) / 1.356e5
+    rate = np.linalg.norm(data[[f"plant.rate.{a}" for a in "pqr"]], axis=1)
     # The means are taken over the steps, each represented by its beginning.
     assert found["ems_deg"] == pytest.approx(np.degrees(np.sqrt((error[:-1] ** 2).sum(axis=1).mean())), rel=1e-12)
     assert found["cms"] == pytest.approx(np.sqrt((moment[:-1] ** 2).mean()), rel=1e-12)
@@ -66,12 +61,3 @@ def test_a_lost_attitude_ends_the_run(orchestrate):
     # The last row is that at which the attitude was lost.
     last = (out / "results.csv").read_text().splitlines()[-1]
     assert float(last.split(",")[0]) == metrics(out)["lost_at"]
-
-
-@pytest.mark.parametrize(("kind", "warns"), [("constant", True), ("white", False)])
-def test_a_seed_that_changes_nothing_is_told(orchestrate, kind, warns):
-    settings = ["--set", f"plant.disturbance.kind={kind}", "--set", "plant.disturbance.seed=7"]
-    finished, _ = orchestrate(EXPERIMENTS / "lqr.toml", *settings)
-    assert finished.returncode == 0, finished.stderr
-    text = "disturbance.seed has no effect: it is used with disturbance.kind = white"
-    assert (text in finished.stderr) == warns, finished.stderr

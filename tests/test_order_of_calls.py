@@ -73,6 +73,8 @@ def test_outputs_are_held_after_a_step_until_an_input_is_set(fmu, name):
         assert due != first or name in ("DLMPC", "FBL"), "an equal value counts as set, so that the next tick is due"
         instance.set(later)
         assert instance.get(MOMENT) != due
+        instance.set(values)
+        assert instance.get(MOMENT) == due, "the evaluation for other inputs leaves no trace"
         instance.restore(saved)
         assert instance.get(MOMENT) == first, "the saved state knows that no input was set"
         instance.set(later)

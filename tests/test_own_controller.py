@@ -1,14 +1,13 @@
 """examples/own-controller, a law outside the project's workspace: built, validated, flown and
 compared."""
 
-import csv
 import subprocess
 
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
-from conftest import EXPERIMENTS, ROOT, program
+from conftest import EXPERIMENTS, ROOT, call, results
 from fmi import ANGLES, MOMENT, RATES
 
 # It compiles what the crate needs, in a workspace of its own. `.ci/run` checks that it compiles.
@@ -16,13 +15,7 @@ pytestmark = pytest.mark.tier("importers")
 FOLDER = ROOT / "examples" / "own-controller"
 # The Riccati equation gives these gains for P = 50, Q = 10: sqrt(P/Q), sqrt((P + 2 sqrt(P Q))/Q).
 GAINS = {"gain.p": np.sqrt(5.0), "gain.d": np.sqrt(5.0 + 2.0 * np.sqrt(5.0))}
-
-
-def columns(folder):
-    with open(folder / "results.csv", newline="") as file:
-        rows = list(csv.DictReader(file))
-    moment = [f"controller.{name}" for name in MOMENT]
-    return np.array([[float(row[name]) for name in [*(f"plant.{name}" for name in ANGLES + RATES), *moment]] for row in rows])
+COLUMNS = [*(f"plant.{name}" for name in ANGLES + RATES), *(f"controller.{name}" for name in MOMENT)]
 
 
 def test_oracle_a_law_from_outside_is_built_flown_and_agrees_with_lqr(experiment, tmp_path):
@@ -38,10 +31,9 @@ def test_oracle_a_law_from_outside_is_built_flown_and_agrees_with_lqr(experiment
     found = []
     for archive in (packed, packed3):
         flown = tmp_path / "flown" / archive.parent.name
-        command = [program("orchestrator"), "run", EXPERIMENTS / "crmpc-robust.toml", "--fmu", f"controller={archive}", "--out", flown]
-        subprocess.run([*command, *gains], check=True, capture_output=True)
-        found.append(columns(flown))
-    expected = columns(experiment("lqr"))
+        call("run", EXPERIMENTS / "crmpc-robust.toml", "--fmu", f"controller={archive}", "--out", flown, *gains)
+        found.append(results(flown)[COLUMNS].to_numpy())
+    expected = results(experiment("lqr"))[COLUMNS].to_numpy()
     assert found[0].shape == expected.shape == (1251, 9)
     assert (np.abs(found[0] - expected).max(axis=0) <= 1e-9 * np.abs(expected).max(axis=0)).all()
     assert np.array_equal(*found)

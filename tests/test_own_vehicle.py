@@ -4,7 +4,6 @@ another file."""
 import json
 import re
 import shutil
-import subprocess
 
 import jsonschema
 import numpy as np
@@ -12,9 +11,8 @@ import pandas as pd
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from conftest import ROOT, program
+from conftest import ROOT, call, tomllib
 from fmi import Instance
-from test_schema import tomllib
 
 ENTRY = ROOT / "orchestrator" / "experiments" / "entry"
 EXAMPLE = ENTRY / "vehicles" / "lifting-body.toml"
@@ -23,8 +21,7 @@ PAPERS = "\n".join((DATA / name).read_text(encoding="utf-8") for name in ("paper
 
 
 def schema() -> dict:
-    printed = subprocess.run([program("orchestrator"), "schema", "vehicle"], capture_output=True, text=True, check=True).stdout
-    return json.loads(printed)
+    return json.loads(call("schema", "vehicle").stdout)
 
 
 SHIPPED = [DATA / "shuttle.toml", *sorted((ENTRY / "vehicles").glob("*.toml"))]
@@ -107,17 +104,6 @@ def test_settings_of_one_component_are_no_other_vehicle(orchestrate, tmp_path):
     file.write_text('sensor.gyroscope.bias.x = "0.2 deg/s"\n')
     finished, _ = orchestrate(ENTRY / "navigated.toml", "--stop", "1", "--set", f"plant.settings.file={file}")
     assert finished.returncode == 0 and "component to component" not in finished.stderr, finished.stderr
-
-
-def test_the_papers_vehicle_from_a_file_flies_with_the_same_bits(orchestrate, tmp_path):
-    (tmp_path / "papers.toml").write_text(PAPERS, encoding="utf-8")
-    parts = [f'[components.{name}.parameters]\n"vehicle.file" = "papers.toml"\n' for name in ("plant", "guidance", "allocator")]
-    again = tmp_path / "again.toml"
-    again.write_text(f'extends = "{ENTRY / "surfaces-and-jets.toml"}"\n' + "".join(parts), encoding="utf-8")
-    flights = [orchestrate(path, "--stop", "900") for path in (ENTRY / "surfaces-and-jets.toml", again)]
-    assert [finished.returncode for finished, _ in flights] == [0, 0], flights
-    one, other = ((out / "results.csv").read_bytes() for _, out in flights)
-    assert one == other
 
 
 @pytest.mark.parametrize(

@@ -3,14 +3,13 @@ delay, and showing them changes nothing else."""
 
 from __future__ import annotations
 
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from conftest import program
+from conftest import call, results
 
 STEP = 0.04
 LIMITS = {"rate": np.radians(5.0), "moment": 1.356e5}
@@ -18,9 +17,8 @@ LIMITS = {"rate": np.radians(5.0), "moment": 1.356e5}
 
 def flown(folder: Path, experiment: str, settings: dict) -> pd.DataFrame:
     given = [part for name, value in settings.items() for part in ("--set", f"{name}={value}")]
-    command = [program("orchestrator"), "run", experiment, "--quiet", "--force", "--out", folder, *given]
-    subprocess.run(command, check=True, capture_output=True)
-    return pd.read_csv(folder / "results.csv")
+    call("run", experiment, "--quiet", "--force", "--out", folder, *given)
+    return results(folder)
 
 
 def norm(table: pd.DataFrame, name: str, axes: str) -> np.ndarray:
@@ -63,13 +61,3 @@ def test_oracle_the_tube_of_the_plan_in_force_contains_the_flight(tmp_path, dela
         closest = max(closest, away / tube)
     # The tube is no wider than needed by orders of magnitude.
     assert closest > 0.1, closest
-
-
-def test_showing_plans_changes_nothing_else(tmp_path):
-    shown = flown(tmp_path / "shown", "crmpc-plan", {})
-    hidden = flown(tmp_path / "hidden", "crmpc-robust", {})
-    for name in [name for name in hidden.columns if name in shown.columns]:
-        np.testing.assert_array_equal(shown[name], hidden[name], err_msg=name)
-    # Without being asked for, no plan is computed.
-    unasked = flown(tmp_path / "unasked", "crmpc-plan", {"controller.plan.shown": "false"})
-    assert (unasked.filter(like="controller.plan.") == 0.0).all(axis=None)

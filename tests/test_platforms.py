@@ -44,8 +44,7 @@ EXPERIMENTS = [
     for path in sorted((ROOT / "orchestrator" / "experiments").glob("*/*.toml"))
     if path.parent.name not in ("base", "campaigns") and path.stem not in PARTS
 ]
-# Libraries of Windows 10 and macOS 11.
-WINDOWS = ("api-ms-win-core-", "api-ms-win-crt-", "bcryptprimitives.", "kernel32.", "ntdll.", "userenv.", "ws2_32.")
+# Libraries of macOS 11.
 MACOS = {
     "/usr/lib/libSystem.B.dylib",
     "/System/Library/Frameworks/CoreFoundation.framework/Versions/A/CoreFoundation",
@@ -100,32 +99,20 @@ def library(request):
     return read
 
 
-def functions(names) -> set[str]:
-    return {name.removeprefix("_") for name in names if name}
+# The objects of lief are kept in names, as their parts do not keep the whole alive. That libraries need nothing but the
+# system, and export the same functions on every platform, fmu-pack holds.
 
 
-# The objects of lief are kept in names, as their parts do not keep the whole alive.
-@pytest.mark.parametrize("platform", marked(["windows-x86_64", "macos-universal"]))
-def test_every_platform_exports_the_same_functions_and_no_others(library, platform):
+@pytest.mark.tier("platforms")
+def test_linux_may_be_as_old_as_promised_and_never_unloads_a_library(library):
     linux = lief.ELF.parse(list(library("linux-x86_64")))
-    expected = functions([symbol.name for symbol in linux.exported_symbols])
-    assert len(expected) == 44 + 75 + 2 and {"fmi2DoStep", "fmi3DoStep"} <= expected
-    if platform == "windows-x86_64":
-        windows = lief.PE.parse(list(library(platform)))
-        exported = windows.get_export()
-        assert functions([entry.name for entry in exported.entries]) == expected
-        return
-    macos = lief.MachO.parse(list(library(platform)))
-    for i in range(macos.size):
-        part = macos.at(i)
-        assert functions([symbol.name for symbol in part.exported_symbols]) == expected
-
-
-@pytest.mark.tier("windows")
-def test_windows_needs_nothing_but_windows(library):
-    windows = lief.PE.parse(list(library("windows-x86_64")))
-    foreign = [entry.name for entry in windows.imports if not entry.name.lower().startswith(WINDOWS)]
-    assert not foreign
+    versions = {each.name for needed in linux.symbols_version_requirement for each in needed.get_auxiliary_symbols()}
+    # CentOS 7 and manylinux2014 have glibc 2.17.
+    assert versions and max(tuple(map(int, name.removeprefix("GLIBC_").split("."))) for name in versions) <= (2, 17)
+    # Thread-local destructors of an unloaded library would crash its host.
+    assert linux.get(lief.ELF.DynamicEntry.TAG.FLAGS_1).has(lief.ELF.DynamicEntryFlags.FLAG.NODELETE)
+    assert len({symbol.name for symbol in linux.exported_symbols}) == 44 + 75 + 2
+    assert not [section.name for section in linux.sections if section.name.startswith((".symtab", ".debug"))]
 
 
 def signed(slice_: bytes) -> bool:

@@ -2,18 +2,13 @@
 proofs and formulas that no FMU computes. Angles are in rad, all other values in SI units.
 """
 
-import sys
 
 import numpy as np
 import pytest
 
-from conftest import ROOT
+from conftest import ROOT, tomllib
 from nlp import DEG, DISTURBANCE, INERTIA, MOMENT_LIMIT, RATE_LIMIT, printed_sets
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 H = 1e-6
 WU_INERTIA = {"x": 588791.0, "y": 1303212.0, "z": 1534164.0, "zx": 24242.0}

@@ -214,6 +214,7 @@ def test_wheels_have_the_fmus_and_the_licences_of_what_is_linked_in(made, dist):
     for tag, folder in WHEELS.items():
         [wheel] = made.glob(f"*-{tag}.whl")
         with zipfile.ZipFile(wheel) as archive:
+            assert {entry.date_time for entry in archive.infolist()} == {(2023, 11, 14, 22, 13, 20)}
             for name in NAMES:
                 packed = archive.read(f"reentry_fmus/data/fmu/{name}.fmu")
                 assert packed == (dist / folder / f"{name}.fmu").read_bytes()

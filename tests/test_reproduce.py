@@ -9,14 +9,13 @@ import shutil
 import signal
 import subprocess
 import time
-import tomllib
 import zlib
 
 import numpy as np
 import pytest
 import results as pages
 
-from conftest import EXPERIMENTS, TARGET, merged, program
+from conftest import EXPERIMENTS, TARGET, merged, program, tomllib
 from figures import check_folder
 
 pytestmark = pytest.mark.tier("studies")
@@ -48,6 +47,7 @@ def copied(name: str, folder):
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
+    """Half a minute, as every number of the pages about this study comes from its 139 runs."""
     out = tmp_path_factory.mktemp("reproduce") / "out"
     finished = reproduce(EXPERIMENTS, out, "--members", str(MEMBERS))
     assert finished.returncode == 0, finished.stderr
@@ -429,6 +429,7 @@ def test_published_parameters_of_wu_2015_are_those_of_the_fmus(wu):
 
 
 def test_every_controller_flies_every_scenario(tmp_path):
+    """It takes more than half a minute, as nothing else flies each law in the scenarios of the others."""
     results = reproduced("exchange", tmp_path)
     assert len(results["runs"]) == 54
     members = {name: run["members"][0] for name, run in results["runs"].items()}
@@ -461,6 +462,8 @@ def test_every_controller_turns_the_bank_angle(tmp_path):
 
 
 def test_every_controller_has_its_margins(tmp_path):
+    """It takes a minute: a table of the results is made of these 112 linear models, and a change of a law has once
+    made it untrue."""
     results = reproduced("margins", tmp_path)
     assert len(results["runs"]) == 112
     assert [claim["verdict"] for claim in results["claims"]] == [HOLDS, HOLDS, HOLDS]

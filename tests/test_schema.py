@@ -3,17 +3,12 @@
 import json
 import re
 import subprocess
-import sys
 
 import jsonschema
 import pytest
 
-from conftest import EXPERIMENTS, ROOT, program
+from conftest import EXPERIMENTS, ROOT, program, tomllib
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 FILES = sorted(EXPERIMENTS.parent.glob("*/*.toml"))
 WRITTEN = {path: path.read_text(encoding="utf-8") for path in FILES}

@@ -1,13 +1,12 @@
 """The sliding-mode controllers as FMUs: the scenario of Wu 2015 run by the orchestrator, and their
 laws at the first tick."""
 
-import csv
 import itertools
 
 import numpy as np
 import pytest
 
-from conftest import ROOT
+from conftest import ROOT, results
 from fmi import ANGLES, MOMENT, RATES, Instance
 
 TVSMC = ROOT / "orchestrator" / "experiments" / "tvsmc-2015"
@@ -15,15 +14,6 @@ DEG = np.pi / 180.0
 INERTIA = np.array([[588791.0, 0.0, -24242.0], [0.0, 1303212.0, 0.0], [-24242.0, 0.0, 1534164.0]])
 BODY = {"vehicle.file": "wu2015"}
 START = dict(zip(ANGLES + RATES, [32 * DEG, 2 * DEG, 58 * DEG, 0.0, 0.0, 0.0]))
-
-
-def results(out, *names: str) -> np.ndarray:
-    """Returns time and these variables row by row; the column titles may carry a unit."""
-    with open(out / "results.csv") as file:
-        rows = list(csv.reader(line for line in file if not line.startswith("#")))
-    header, rows = rows[0], np.array(rows[1:], dtype=float)
-    columns = [next(i for i, title in enumerate(header) if title.split(" ")[0].startswith(name)) for name in names]
-    return np.column_stack([rows[:, 0], rows[:, columns]])
 
 
 def kinematics(alpha, beta) -> np.ndarray:
@@ -102,10 +92,10 @@ variables = ["plant.*", "controller.moment.*", "controller.disturbanceEstimate.*
             *(f"{known}.{axis}" for axis in "xyz"),
             *(f"controller.disturbanceEstimate.{angle}" for angle in ("alpha", "beta", "sigma")),
         ]
-        table = results(out, *names)
-        time, *parts = np.split(table, [1, 4, 7, 10, 13], axis=1)
+        table = results(out)
+        time, parts = table["time"].to_numpy(), np.split(table[names].to_numpy(), 5, axis=1)
         actual = uncertainty(*parts[:4])
-        late = (time[:, 0] >= 10.0 - 1e-9) & (time[:, 0] < 20.0 - 1e-9)
+        late = (time >= 10.0 - 1e-9) & (time < 20.0 - 1e-9)
         error, size = ((x[late].reshape(-1, 100, 3).mean(axis=1) ** 2).sum(axis=1).mean() for x in (parts[4] - actual, actual))
         found.append(np.sqrt(error / size))
     assert len(found) == 8 and least < min(found) and max(found) < most, found

@@ -14,12 +14,8 @@ from typing import NamedTuple
 import jsonschema
 import pytest
 
-from conftest import ROOT, TARGET, merged, program
+from conftest import ROOT, TARGET, merged, program, tomllib
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 RULES = tomllib.loads((ROOT / "tests" / "snippets.toml").read_text())
 

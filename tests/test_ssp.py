@@ -1,21 +1,18 @@
 """SSP archives: written from experiments, valid by the standard's schema, and run by the
 orchestrator, as are archives of others. Other importers run them in test_importers.py."""
 
-import csv
 import html
 import json
 import math
 import re
 import shutil
-import subprocess
-import tomllib
 import zipfile
 
 import numpy as np
 import pytest
 from fmpy.ssp.ssd import read_ssd
 
-from conftest import EXPERIMENTS, TARGET, archive, program
+from conftest import EXPERIMENTS, TARGET, archive, call, results, tomllib
 
 TABLES = {path: tomllib.loads(path.read_text()) for path in sorted(EXPERIMENTS.parent.rglob("*.toml")) if path.parent.name != "vehicles"}
 # A file without a title is there to be extended, one of a paper is a study, and in a campaign something varies.
@@ -27,23 +24,11 @@ TIMES = ("solver.time", "innerLaw.time")
 
 
 def pack(experiment, path, *arguments):
-    command = [program("orchestrator"), "pack", experiment, "--out", path, "--fmu-dir", TARGET / "fmu", *arguments]
-    finished = subprocess.run(command, capture_output=True, text=True, timeout=60)
-    assert finished.returncode == 0, finished.stderr
-    return finished.stdout
+    return call("pack", experiment, "--out", path, "--fmu-dir", TARGET / "fmu", *arguments).stdout
 
 
-def run(path, out, *arguments):
-    command = [program("orchestrator"), "run", path, "--out", out, "--quiet", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=out.parent)
-
-
-def columns(out) -> dict[str, np.ndarray]:
-    """Returns the results by the name of the variable, without unit."""
-    with (out / "results.csv").open() as file:
-        rows = list(csv.reader(file))
-    names = [name.split(" ")[0] for name in rows[0]]
-    return {name: np.array([float(row[i]) for row in rows[1:]]) for i, name in enumerate(names)}
+def run(path, out, *arguments, code=0):
+    return call("run", path, "--out", out, "--quiet", *arguments, code=code, cwd=out.parent)
 
 
 @pytest.mark.parametrize("experiment", ALL, ids=lambda path: f"{path.parent.name}/{path.stem}")
@@ -73,16 +58,14 @@ def test_an_archive_of_ours_is_the_same_run(name, tmp_path):
     experiment = EXPERIMENTS.parent / f"{name}.toml"
     said = pack(experiment, tmp_path / "x.ssp", "--stop", "1")
     step = re.search(r"--step (\S+)", said)[1]
-    finished = run(tmp_path / "x.ssp", tmp_path / "ssp", "--step", step)
-    assert finished.returncode == 0, finished.stderr
-    finished = run(experiment, tmp_path / "toml", "--stop", "1", "--fmu-dir", TARGET / "fmu")
-    assert finished.returncode == 0, finished.stderr
-    ssp, toml = columns(tmp_path / "ssp"), columns(tmp_path / "toml")
-    assert len(toml) > 10 and toml.keys() <= ssp.keys()
+    run(tmp_path / "x.ssp", tmp_path / "ssp", "--step", step)
+    run(experiment, tmp_path / "toml", "--stop", "1", "--fmu-dir", TARGET / "fmu")
+    ssp, toml = results(tmp_path / "ssp"), results(tmp_path / "toml")
+    assert len(toml.columns) > 10 and set(toml) <= set(ssp)
     # The experiment may record fewer rows.
     rows = np.isin(ssp["time"], toml["time"])
     differ = [name for name, values in toml.items() if not np.array_equal(ssp[name][rows], values) and not name.endswith(TIMES)]
-    assert rows.sum() == len(toml["time"]) and not differ
+    assert rows.sum() == len(toml) and not differ
     ssp, toml = (json.loads((tmp_path / kind / "results.json").read_text()) for kind in ("ssp", "toml"))
     assert ssp["simulation"] == toml["simulation"]
     assert [component["sha256"] for component in ssp["components"].values()] == [component["sha256"] for component in toml["components"].values()]
@@ -93,8 +76,7 @@ def test_an_instance_that_fails_in_an_archive_is_named_by_archive_and_entry(tmp_
     with zipfile.ZipFile(path) as old, zipfile.ZipFile(tmp_path / "y.ssp", "w") as new:
         for entry in old.namelist():
             new.writestr(entry, b"no archive" if entry == "resources/LQR.fmu" else old.read(entry))
-    finished = run(tmp_path / "y.ssp", tmp_path / "out")
-    assert finished.returncode == 2
+    finished = run(tmp_path / "y.ssp", tmp_path / "out", code=2)
     assert finished.stderr.startswith(f"error: {tmp_path / 'y.ssp'}: resources/LQR.fmu: is not a zip archive"), finished.stderr
 
 
@@ -140,10 +122,9 @@ def foreign(path, ssd=SSD, ssv=SSV):
 
 
 def test_oracle_an_archive_of_another_maker_with_subsystems_and_transformations(tmp_path):
-    finished = run(foreign(tmp_path / "x.ssp"), tmp_path / "out", "--step", "0.02")
-    assert finished.returncode == 0, finished.stderr
-    found = columns(tmp_path / "out")
-    assert found["time"][0] == 1.0 and found["time"][-1] == 3.0
+    run(foreign(tmp_path / "x.ssp"), tmp_path / "out", "--step", "0.02")
+    found = results(tmp_path / "out")
+    assert found["time"].iloc[0] == 1.0 and found["time"].iloc[-1] == 3.0
     assert found["vehicle/body.attitude.alpha"][0] == pytest.approx(math.radians(3.0), rel=1e-15)
     assert not found["vehicle/body.disturbance.delta.alpha"].any()
     # The moment is four times the law's, then half of that plus seven. The law comes first, so
@@ -171,17 +152,16 @@ def test_oracle_an_archive_of_another_maker_with_subsystems_and_transformations(
 def test_archives_that_cannot_be_run_are_refused_in_one_line(old, new, culprit, tmp_path):
     assert (old in SSD) != (old in SSV)
     path = foreign(tmp_path / "x.ssp", SSD.replace(old, new, 1), SSV.replace(old, new, 1))
-    finished = run(path, tmp_path / "out")
-    assert finished.returncode == 2 and culprit in finished.stderr, finished.stderr
+    finished = run(path, tmp_path / "out", code=2)
+    assert culprit in finished.stderr, finished.stderr
     assert finished.stderr.count("\n") == 1 and not (tmp_path / "out").exists()
 
 
 def test_an_input_without_a_connection_keeps_its_start_value(tmp_path):
     old, new = b'endConnector="roll"', b'endConnector="yaw"'
-    assert run(foreign(tmp_path / "x.ssp", SSD.replace(old, new, 1)), tmp_path / "out").returncode == 0
+    run(foreign(tmp_path / "x.ssp", SSD.replace(old, new, 1)), tmp_path / "out")
 
 
 def test_what_is_no_archive_is_refused(tmp_path):
     shutil.copy(archive("LQR"), tmp_path / "x.ssp")
-    finished = run(tmp_path / "x.ssp", tmp_path / "out")
-    assert finished.returncode == 2 and "is not an SSP archive" in finished.stderr
+    assert "is not an SSP archive" in run(tmp_path / "x.ssp", tmp_path / "out", code=2).stderr

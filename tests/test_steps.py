@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fmi import ANGLES, MOMENT, NOT_REPRODUCIBLE, RATES, REFERENCE, Instance
+from fmi import ANGLES, NOT_REPRODUCIBLE, RATES, REFERENCE, Instance
 
 CONTROLLERS = ["CRMPC", "DLMPC", "LQR"]
 # Time for which inputs are held, s.
@@ -58,42 +58,3 @@ def test_any_communication_step_gives_the_same_outputs_at_common_ticks(fmu, name
     for (row, reference), (other, other_reference) in zip(expected, found):
         assert row == other
         np.testing.assert_allclose(other_reference, reference, rtol=1e-12)
-
-
-@pytest.mark.parametrize("name", CONTROLLERS)
-def test_outputs_are_held_between_ticks_and_follow_inputs_at_a_tick(fmu, name):
-    with Instance(fmu(name)).start(inputs=held(0)) as instance:
-        at_tick = instance.get(MOMENT)
-        instance.set(held(1))
-        changed = instance.get(MOMENT)
-        assert changed != at_tick
-        instance.set(held(0))
-        assert instance.get(MOMENT) == at_tick, "the evaluation for other inputs must leave no trace"
-        instance.step(0.0, FEEDBACK / 2)
-        instance.set(held(1))
-        assert instance.get(MOMENT) == at_tick
-        instance.step(FEEDBACK / 2, FEEDBACK / 2)
-        assert instance.get(MOMENT) == at_tick, "the moment that acted over the step"
-        instance.set(held(1))
-        assert instance.get(MOMENT) != at_tick
-
-
-@pytest.mark.parametrize("name", CONTROLLERS)
-def test_a_constant_external_reference_is_the_constant_profile(fmu, name):
-    angles = [0.16, 0.01, -0.45]
-    constant = {f"reference.angle.{axis}": value for axis, value in zip(("alpha", "beta", "sigma"), angles)}
-    external = {f"reference.external.{axis}": value for axis, value in zip(("alpha", "beta", "sigma"), angles)}
-    for kind in ("Rate", "Acceleration"):
-        external |= {f"reference.external{kind}.{axis}": 0.0 for axis in ("alpha", "beta", "sigma")}
-    outcomes = []
-    for profile, parameters, inputs in (("constant", constant, {}), ("external", {}, external)):
-        settings = {"reference.profile": profile, **parameters}
-        with Instance(fmu(name), settings).start(inputs=held(0) | inputs) as instance:
-            rows = []
-            for tick in range(20):
-                instance.set(held(tick))
-                rows.append(instance.get(MOMENT + REFERENCE))
-                instance.step(tick * FEEDBACK, FEEDBACK)
-            outcomes.append(rows)
-    assert outcomes[0][0][3:] == angles
-    assert outcomes[0] == outcomes[1]

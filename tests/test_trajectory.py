@@ -4,7 +4,6 @@ differentiated here."""
 import numpy as np
 import pytest
 
-from conftest import EXPERIMENTS, merged
 from fmi import ANGLES, RATES, Instance
 
 ANGLE_RATES = [f"attitudeRate.{axis}" for axis in ("alpha", "beta", "sigma")]
@@ -76,21 +75,3 @@ def test_oracle_an_inertial_attitude_at_rest_turns_against_the_earth(fmu):
         assert plant.get(RATES) == [0.0] * 3
         last = attitude(place + 50 * change, 50 * (east + EARTH), plant.get(ANGLES))
     np.testing.assert_allclose(last, first, rtol=0, atol=1e-10)
-
-
-def test_the_orchestrator_gives_values_to_inputs_without_a_connection(orchestrate, tmp_path):
-    text = merged(EXPERIMENTS / "lqr.toml")
-    values = '"trajectory.flightPathAngleRate" = "-0.1 deg/s"\n"kinematics" = "exact"\n'
-    assert "[components.plant.parameters]\n" in text
-    ends = []
-    for added in ("", values):
-        path = tmp_path / "experiment.toml"
-        path.write_text(text.replace("[components.plant.parameters]\n", "[components.plant.parameters]\n" + added))
-        finished, out = orchestrate(path, "--stop", "0.04")
-        assert finished.returncode == 0, finished.stderr
-        data = np.genfromtxt(out / "results.csv", delimiter=",", names=True, deletechars="")
-        ends.append(np.array([data[f"plant.{name}"][-1] for name in ANGLES]))
-    # This is 0.04 s of Eq. (1) from beta = 10 deg, sigma = -30 deg: alpha falls by cos sigma / cos
-    # beta times the turn of the path.
-    turn = np.radians(-0.1) * 0.04
-    assert (ends[1] - ends[0])[0] == pytest.approx(-turn * np.cos(np.radians(30)) / np.cos(np.radians(10)), rel=1e-2)

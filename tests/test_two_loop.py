@@ -2,21 +2,16 @@
 fins and jets, printed forms."""
 
 import json
-import subprocess
 
 import numpy as np
 import pytest
 
 import reach
-from conftest import ROOT, TARGET, program
+from conftest import ROOT, TARGET, call, tomllib
 from figures import check_folder
 
 pytestmark = pytest.mark.tier("studies")
 
-try:
-    import tomllib
-except ModuleNotFoundError:  # Python 3.10
-    import tomli as tomllib
 
 STUDY = ROOT / "orchestrator" / "experiments" / "two-loop-smc"
 PRINTED = ["printed-sign", "printed-matrix", "printed-factor"]
@@ -25,9 +20,7 @@ PRINTED = ["printed-sign", "printed-matrix", "printed-factor"]
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("two-loop") / "out"
-    command = [program("orchestrator"), "reproduce", STUDY, "--out", out, "--fmu-dir", TARGET / "fmu"]
-    finished = subprocess.run(command, capture_output=True, text=True, cwd=out.parent, timeout=300)
-    assert finished.returncode == 0, finished.stderr
+    call("reproduce", STUDY, "--out", out, "--fmu-dir", TARGET / "fmu", cwd=out.parent)
     study = tomllib.loads((STUDY / "study.toml").read_text(encoding="utf-8"))
     for figure in study["figure"]:
         assert (out / "figures" / f"{figure['id']}.svg").exists()

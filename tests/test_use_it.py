@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from conftest import ROOT, TARGET, program
+from conftest import ROOT, TARGET, call, program, results
 
 # tests/test_strict.py runs the programs for FMI 3.0, and what follows is for Windows.
 PAGE, _ = (ROOT / "docs" / "use-it.md").read_text().split("\n## FMI 3.0\n")
@@ -62,11 +62,9 @@ def test_the_attitudes_by_which_a_tool_shows_its_delay(tmp_path):
     assert len(rows) == len(LOOPS)
     for row, options in zip(rows, LOOPS):
         experiment = ROOT / "orchestrator" / "experiments" / "crmpc-2022" / "lqr.toml"
-        command = [program("orchestrator"), "run", experiment, "--stop", "2", *options]
         folder = ["--fmu-dir", TARGET / "fmu", "--out", tmp_path, "--force", "--no-plot"]
-        subprocess.run([*command, *folder], capture_output=True, check=True, timeout=60)
-        header, *_, last = (tmp_path / "results.csv").read_text().splitlines()
-        values = dict(zip(header.split(","), map(float, last.split(","))))
+        call("run", experiment, "--stop", "2", *options, *folder)
+        values = results(tmp_path).iloc[-1]
         assert values["time"] == 2.0
         found = [values[f"plant.attitude.{angle}"] for angle in ("alpha", "beta", "sigma")]
         said = [cell.strip(" |").replace("−", "-") for cell in row[2:]]

@@ -7,12 +7,8 @@ import pytest
 import clairvoyant
 import nlp
 import yardsticks
-from conftest import EXPERIMENTS
+from conftest import EXPERIMENTS, tomllib
 
-try:
-    import tomllib
-except ModuleNotFoundError:  # Python 3.10
-    import tomli as tomllib
 
 
 def values_of(name: str) -> dict[str, float]:

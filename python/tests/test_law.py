@@ -1,6 +1,7 @@
 """Campaigns over laws in Python."""
 
 import importlib
+import io
 import json
 import os
 import re
@@ -227,36 +228,81 @@ def test_a_campaign_without_processes_is_refused(short, tmp_path):
         campaign(short, law=pd_law).run(out=tmp_path / "out", jobs=0)
 
 
-def test_an_interruption_keeps_what_is_flown(tmp_path):
-    """Ctrl-C goes to all processes of a terminal; here the one that called `run` gets it alone."""
-    (tmp_path / "gusts.toml").write_text(TEXT.replace(f"cases = {CASES}", "cases = 5000"))
-    program = tmp_path / "program.py"
-    program.write_text(
-        "from laws import pd\nfrom reentry_fmus import campaign\n"
-        "campaign('gusts.toml', law=pd).run(out='out', jobs=2)\n"
-    )
+def test_progress_is_told_while_a_campaign_flies(short, tmp_path, monkeypatch):
+    """No case ends before it is told."""
+    told = tmp_path / "told"
+
+    class Heard(io.StringIO):
+        def write(self, text):
+            with told.open("a") as file:
+                return file.write(text)
+
+    def law(state):
+        while not told.exists():
+            time.sleep(0.01)
+        return [0.0, 0.0, 0.0]
+
+    short.write_text(SHORT.replace("cases = 50", "cases = 2"))
+    monkeypatch.setattr("reentry_fmus._campaign.PAUSE", 0.2)
+    monkeypatch.setattr(sys, "stderr", Heard())
+    campaign(short, law=law).run(out=tmp_path / "out")
+    assert told.read_text().startswith("campaign-law: 2 cases to be flown\n")
+
+
+def ended(number, code, folder, has_begun):
+    """Sends a signal to a program that has begun, and waits until nothing that it started runs on. Ctrl-C
+    goes to all processes of a terminal; here the one that called the package gets it alone."""
+    imports = "from laws import pd\nfrom reentry_fmus import campaign, experiment\n"
+    (folder / "program.py").write_text(imports + code)
     paths = [str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
-    process = subprocess.Popen(
-        [sys.executable, program], cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True, **USUAL
-    )
-    parts = tmp_path / "out" / "parts"
-    while len(list(parts.glob("*.cases"))) < 2:
+    here, there = os.pipe()
+    command = [sys.executable, "program.py"]
+    process = subprocess.Popen(command, cwd=folder, env=environment, stdin=there, stderr=there, **USUAL)
+    os.close(there)
+    while not has_begun():
         assert process.poll() is None
         time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
-    _, error = process.communicate()
-    assert process.returncode != 0 and error.rstrip().endswith("KeyboardInterrupt")
+    process.send_signal(number)
+    # All of them hold the other end of the pipe.
+    with open(here) as heard:
+        said = heard.read()
+    assert process.wait() != 0
+    return said
+
+
+signals = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+not_windows = pytest.mark.skipif(os.name == "nt", reason="Ctrl-C goes another way under Windows")
+
+
+@not_windows
+@signals
+@pytest.mark.parametrize("law", ["pd", "None"])
+def test_a_signal_ends_a_campaign_and_keeps_what_is_flown(law, number, tmp_path):
+    (tmp_path / "gusts.toml").write_text(TEXT.replace(f"cases = {CASES}", "cases = 5000"))
+    parts = tmp_path / "out" / "parts"
+    code = f"campaign('gusts.toml', law={law}).run(out='out', jobs=2)\n"
+    said = ended(number, code, tmp_path, lambda: len(list(parts.glob("*.cases"))) >= 2)
+    assert number == signal.SIGTERM or said.rstrip().endswith("KeyboardInterrupt")
     kept = sorted(path.name for path in parts.glob("*.cases"))
-    left = json.loads(
-        campaign(tmp_path / "gusts.toml", law=pd_law).call(
-            "--work", "--out", str(tmp_path / "out")
-        )
-    )["missing"]
-    assert len(left) == 216 - len(kept)
+    flown = sum(int(last) - int(first) for first, last in re.findall(r"(\d+)-(\d+)", " ".join(kept)))
+    work = campaign(tmp_path / "gusts.toml", law=pd_law if law == "pd" else None)
+    left = json.loads(work.call("--work", "--out", str(tmp_path / "out")))["missing"]
+    assert sum(last - first for first, last in left) == 5000 - flown > 0
     # Nothing flies on.
     time.sleep(1.0)
-    assert sorted(path.name for path in parts.glob("*.cases")) == kept
+    assert sorted(path.name for path in parts.iterdir()) == kept
+
+
+@not_windows
+@signals
+def test_a_signal_ends_a_run_and_keeps_its_rows(number, tmp_path):
+    table = tmp_path / "out" / "results.csv"
+    code = "experiment('from-120km', out='out')\n"
+    ended(number, code, tmp_path, lambda: table.is_file() and table.stat().st_size > 10_000)
+    heading, *rows = table.read_text().splitlines(keepends=True)
+    assert {row.count(",") for row in rows} == {heading.count(",")} and rows[-1].endswith("\n")
+    assert 10.0 < float(rows[-1].split(",")[0]) < 1000.0
 
 
 @pytest.mark.parametrize("answer", [b"", bytes(80)])

@@ -253,13 +253,6 @@ def test_what_an_fmu_prints_is_no_message_for_a_law(tmp_path):
     assert np.array_equal(noisy["controller.moment.x"], quiet["controller.moment.x"])
 
 
-def test_a_case_of_a_search_has_no_number(tmp_path):
-    (tmp_path / "gusts.toml").write_text(CAMPAIGN)
-    with pytest.raises(LawError, match="the law fails failed at t = 0.52 s") as caught:
-        campaign(tmp_path / "gusts.toml", law=fails).worst(out=tmp_path / "out")
-    assert caught.value.case is None
-
-
 def test_what_a_law_cannot_fly_is_refused(tmp_path):
     with pytest.raises(TypeError, match="leave out its FMU"):
         experiment("lqr", law=pd_law, fmu={"controller": "FBL"})

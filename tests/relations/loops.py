@@ -5,14 +5,13 @@ from __future__ import annotations
 
 import json
 import subprocess
-import tomllib
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from conftest import ROOT, TARGET, merged, program
+from conftest import ROOT, TARGET, merged, program, tomllib
 
 FMUS = TARGET / "fmu"
 ATTITUDE = [f"plant.attitude.{axis}" for axis in ("alpha", "beta", "sigma")]

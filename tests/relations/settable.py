@@ -27,15 +27,11 @@ from fmpy.fmi1 import FMICallException
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from conftest import NAMES, ROOT, TARGET, archive, program
+from conftest import NAMES, ROOT, TARGET, archive, program, tomllib
 from fmi import NOT_REPRODUCIBLE, Fmu, Instance, number
 from parameters import joined, pattern, without_index
 from scenes import SCENES
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 PAGE = TARGET / "settings.md"
 TIMED = {"solver.timeBudget"}

@@ -1,11 +1,10 @@
 """Independence of a flight from left and right, the clock, the longitude, the plant's own step."""
 
-import tomllib
 
 import numpy as np
 import pytest
 
-from conftest import ROOT
+from conftest import ROOT, tomllib
 from loops import ATTITUDE, MOMENT, RATES, content, controllers, experiments, fly
 from test_turns import same
 

@@ -1,6 +1,7 @@
 //! Outputs between steps and events.
 
 use super::actuators::far;
+use super::entry::entering;
 use super::model_exchange::{exchange, tabulated};
 use super::sensors::mems;
 use super::{Ramp, delayed, in_model_exchange, outputs, started, step};
@@ -115,7 +116,7 @@ fn looking_changes_nothing() {
 #[test]
 fn a_saved_state_goes_on_bit_for_bit() {
     let delayed: fn(&mut ReentryPlant) = |instance| instance.parameters.converter.delay = 0.117;
-    let in_steps = [delayed, far, tabulated, mems].map(|set| (set, false));
+    let in_steps = [delayed, far, tabulated, mems, entering].map(|set| (set, false));
     let exchanged = [far, tabulated, mems].map(|set| (set, true));
     for (case, (set, exchanges)) in in_steps.into_iter().chain(exchanged).enumerate() {
         let mut instances = vec![started(set)];
