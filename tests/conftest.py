@@ -51,7 +51,7 @@ TIERS = ("browser", "importers", "manual", "memory", "platforms", "release", "st
 
 # The files that take longest. Begun first, none of them runs alone at the end while the other
 # processes of scripts/test have nothing left to do.
-LONGEST = ["test_wheel.py", "test_platforms.py", "test_manual.py"]
+LONGEST = ["test_reproduce.py", "test_wheel.py", "test_platforms.py", "test_manual.py"]
 
 
 def newest(*candidates: Path) -> Path:

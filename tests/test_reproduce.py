@@ -489,6 +489,8 @@ def test_every_controller_has_its_margins(tmp_path):
 
 
 def test_every_controller_flies_an_entry(tmp_path):
+    """Its 47 whole flights, two at a time on two cores, take more than a minute: nothing else flies each law through an
+    entry, navigated, and by surfaces and jets, and a page has the numbers of each."""
     results = reproduced("entry", tmp_path)
     assert len(results["runs"]) == 47
     assert [claim["verdict"] for claim in results["claims"]] == [HOLDS, HOLDS, HOLDS]
