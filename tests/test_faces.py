@@ -58,7 +58,8 @@ def named(path: Path) -> str:
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory):
-    """Folder of the results by face and experiment."""
+    """Folder of the results by face and experiment. It takes half a minute, as every experiment is flown by each of
+    them: nothing else compares them."""
     folder = tmp_path_factory.mktemp("faces")
 
     def fly(face: str, path: Path, *arguments: str) -> None:

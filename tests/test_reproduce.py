@@ -532,5 +532,6 @@ def test_pages_agree_with_the_study_of_wu_2015(wu):
 
 @pytest.mark.parametrize("study", ["tvsmc-2015-biases", "two-loop-smc"])
 def test_pages_agree_with_the_study(study, tmp_path):
+    """The study of the biases takes more than 20 s, as it flies all their corners, whose numbers are on a page."""
     reproduced(study, tmp_path)
     assert differences(tmp_path / "out") == []

@@ -14,6 +14,7 @@ from conftest import PAGES, ROOT
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_the_page_prints_what_it_says(page, tmp_path, monkeypatch):
+    """The whole of docs/python.md takes half a minute, campaigns and all: readers begin by copying these lines."""
     monkeypatch.chdir(tmp_path)
     text = page.read_text(encoding="utf-8")
     # A block of Python, and what it prints if the page says so at once.
