@@ -47,6 +47,8 @@ pub struct Memory {
     pub turn_time: f64,
     /// Reference that the last optimisation tracks.
     pub tracked: Tracked,
+    /// Optimisations for which the distance of the tracked reference stays halved, for each halving.
+    pub halved_for: u32,
     /// Gain K of the feedback law.
     pub gain: Gain,
     /// Feedback ticks from the beginning of the nominal trajectory to the beginning of the plan in

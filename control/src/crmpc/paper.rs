@@ -84,7 +84,7 @@ impl Paper {
 
     /// Plans by the optimum of (10), or by the shifted previous plan (31).
     fn optimise(&mut self, planner: &mut Planner, memory: &mut Memory, tick: &Tick) {
-        planner.begin(&mut self.stages, tick, Vector3::zeros());
+        planner.begin(&mut self.stages, memory, tick, Vector3::zeros());
         let Settings { horizon: n, initial_state, period_optimisation: h, .. } = self.settings;
         let first = !memory.started;
         if first {

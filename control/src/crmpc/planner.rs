@@ -14,6 +14,7 @@ use super::state::error;
 use crate::clock::Instant;
 use crate::error::DesignError;
 use crate::mpc::{self, Bounded, Chain, Cost, ErrorTrajectory, Layout, Optimiser, State, per_axis};
+use crate::report::SolverStatus;
 use nalgebra::{Vector3, Vector6};
 use std::f64::consts::PI;
 use vehicle::reference::Reference;
@@ -27,6 +28,10 @@ const ANGLE_SCALE: f64 = 0.1;
 /// limit leaves within the horizon, between two angles, rad.
 const SHARE_OF_THE_WAY: f64 = 0.8;
 const DISTANCES: [f64; 2] = [20.0 * PI / 180.0, 50.0 * PI / 180.0];
+/// Number of optima that have to be found before a distance that a kept plan has halved is doubled
+/// again, and the same for the four halvings that there are at most.
+const HALVED_FOR: u32 = 5;
+const LONGEST_HALVED: u32 = 4 * HALVED_FOR;
 /// Share by which a window of the horizon is wider than the violated intervals, at each end. With
 /// the robust set most intervals of a window are near their bounds, and an iteration costs more.
 const PAPER_MARGIN: f64 = 0.5;
@@ -116,7 +121,17 @@ impl Planner {
     /// to it: an artificial reference as in Limon et al., "MPC for tracking piecewise constant
     /// references", Automatica 44 (2008). From the far one the optimum without constraints would
     /// exceed the bounds by orders of magnitude, and no iteration would recover from that.
-    pub(super) fn begin(&mut self, stages: &mut Stages, tick: &Tick, shift: Vector3<f64>) {
+    ///
+    /// As long as optima are not found or not certified, that point comes nearer, as a kept plan
+    /// hardly leads on.
+    pub(super) fn begin(
+        &mut self,
+        stages: &mut Stages,
+        memory: &Memory,
+        tick: &Tick,
+        shift: Vector3<f64>,
+    ) {
+        let reach = self.reach / f64::from(1 << memory.halved_for.div_ceil(HALVED_FOR));
         self.clock = Instant::now();
         self.optimiser.begin();
         (self.measured, self.shift) = (tick.state, shift);
@@ -132,8 +147,12 @@ impl Planner {
             let measured = &tick.measured.angles;
             let way = slot.angles - measured;
             let distance = way.norm();
-            if distance > self.reach {
-                let angles = measured + way * (self.reach / distance);
+            if distance > reach {
+                let mut angles = measured + way * (reach / distance);
+                // A disturbance may have pushed the vehicle beyond what a plan can reach.
+                if memory.halved_for > 0 {
+                    angles.y = angles.y.clamp(-self.sideslip, self.sideslip);
+                }
                 *slot = Reference { angles, ..Reference::default() };
                 instead = Instead::OnTheWay;
             }
@@ -208,6 +227,10 @@ impl Planner {
     /// Ends the optimisation with this report.
     pub(super) fn end(&self, memory: &mut Memory, report: &mpc::OptimiserReport) {
         memory.tracked = self.tracked;
+        memory.halved_for = match report.status {
+            SolverStatus::Kept => (memory.halved_for + HALVED_FOR).min(LONGEST_HALVED),
+            _ => memory.halved_for.saturating_sub(1),
+        };
         memory.report.record(report, self.optimiser.is_exhausted(), self.clock);
     }
 }

@@ -90,7 +90,7 @@ impl Robust {
     ) -> Option<Contradiction> {
         let assured = memory.assured();
         let shift = if assured { memory.observed.shift(&self.settings) } else { Vector3::zeros() };
-        planner.begin(&mut self.stages, tick, shift);
+        planner.begin(&mut self.stages, memory, tick, shift);
         self.terms = self.terms(memory);
         self.turn = self.needed_by_turn(&memory.turn);
         let before = if memory.started {
