@@ -5,6 +5,7 @@ use super::rule::{self, Tightened};
 use super::settings::Settings;
 use crate::error::{DesignError, Refusal};
 use crate::error_dynamics::Gain;
+use vehicle::math::cos;
 
 /// Returns the largest value of a setting between 0 and `tried` for which the design holds with the
 /// other settings unchanged, and with any gain that may be taken; `None` if not even 0 does. The
@@ -39,10 +40,13 @@ pub(super) fn largest_share(s: &Settings) -> Option<f64> {
     largest(1.0, s.feedback, |share| guarantee::with_share(s, share))
 }
 
-/// Returns the largest Δ̄ for which the design holds with a gain by rule.
+/// Returns the largest Δ̄ for which the design holds with a gain by rule. No moment compensates for
+/// more than sec β̄ `limit.moment` / λ_min(I).
 fn by_rule(s: &Settings) -> Option<f64> {
     let with = |disturbance_bound| Settings { disturbance_bound, feedback: Gain::default(), ..*s };
-    largest(s.disturbance_bound, *rule::candidates(&with(0.0)).first()?, with)
+    let smallest_inertia = s.body.inertia.symmetric_eigenvalues().min();
+    let too_large = s.limit_moment / (smallest_inertia * cos(s.sideslip_domain));
+    largest(too_large, *rule::candidates(&with(0.0)).first()?, with)
 }
 
 /// Returns the error that says why the guarantee cannot be given with the gain that comes closest,
