@@ -34,7 +34,6 @@ pub use memory::{Acting, Instead, Margins, Memory, Tracked};
 pub use observer::Observed;
 pub use plan::{Plan, Terms};
 pub use set::{Bounds, Posed};
-pub use settings::Published;
 pub use settings::{Constraints, Guarantee, InitialState, ObserverSettings, Settings};
 pub use supervision::{Contradiction, GuaranteeStatus, Supervision};
 

@@ -238,28 +238,6 @@ pub struct Settings {
     pub shows_plan: bool,
 }
 
-/// The constants that Chai 2022, section 5.1 prints for its own design.
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Published {
-    /// Terminal weight G per axis: G11, G12, G22.
-    pub g: [f64; 3],
-    /// Bound r̄₀ as printed.
-    pub r0: f64,
-    /// Bound r̄₁ as printed.
-    pub r1: f64,
-    /// Bound Ω̄ as printed.
-    pub omega: f64,
-    /// Condition number Ī·Ī′ as printed.
-    pub condition: f64,
-    /// Peak c̄ of the step response as printed.
-    pub c: f64,
-    /// Terminal radius ε₁ as printed.
-    pub epsilon1: f64,
-    /// Terminal radius ε₂ as printed.
-    pub epsilon2: f64,
-}
-
 /// The gains K that are taken where none is set.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -285,7 +263,6 @@ struct File {
     settings: Table,
     paper: Table,
     feedback: Rule,
-    published: Published,
 }
 
 const FILE: &str = "crmpc-2022.toml";
@@ -339,12 +316,5 @@ impl Settings {
             data::set(&mut settings, FILE, &file.paper);
         }
         settings
-    }
-}
-
-impl Published {
-    /// Returns the printed constants.
-    pub fn crmpc2022() -> Self {
-        embedded().published
     }
 }

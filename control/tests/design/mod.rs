@@ -9,6 +9,34 @@ mod sampled;
 use control::crmpc::{Constraints, Design, Settings, held_terminal_weight, terminal_weight};
 use control::error_dynamics::{Gain, SampledError};
 use nalgebra::{Matrix2, Vector2};
+use serde::Deserialize;
+
+/// The constants that Chai 2022, section 5.1 prints for its own design.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Published {
+    /// Terminal weight G per axis: G11, G12, G22.
+    g: [f64; 3],
+    /// Bound r̄₀ as printed.
+    r0: f64,
+    /// Bound r̄₁ as printed.
+    r1: f64,
+    /// Bound Ω̄ as printed.
+    omega: f64,
+    /// Condition number Ī·Ī′ as printed.
+    condition: f64,
+    /// Peak c̄ of the step response as printed.
+    c: f64,
+    /// Terminal radius ε₁ as printed.
+    epsilon1: f64,
+    /// Terminal radius ε₂ as printed.
+    epsilon2: f64,
+}
+
+/// Returns the printed constants.
+fn published() -> Published {
+    toml::from_str(include_str!("../data/chai_2022_printed.toml")).unwrap()
+}
 
 fn settings() -> Settings {
     Settings::new(Constraints::Paper).resolved().unwrap()

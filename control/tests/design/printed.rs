@@ -1,8 +1,8 @@
 //! The numbers printed in Chai 2022, section 5.1.
 
-use super::{assert_digits, gain, settings};
+use super::{assert_digits, gain, published, settings};
 use control::crmpc::{
-    Constraints, Design, PaperConstants, Published, Settings, step_response_peak, terminal_weight,
+    Constraints, Design, PaperConstants, Settings, step_response_peak, terminal_weight,
 };
 use control::error_dynamics::Gain;
 use nalgebra::{Matrix2, Vector2};
@@ -14,7 +14,7 @@ fn constants(settings: &Settings) -> PaperConstants {
 #[test]
 fn published_terminal_weight_satisfies_15_with_equality() {
     let settings = settings();
-    let [g11, g12, g22] = Published::crmpc2022().g;
+    let [g11, g12, g22] = published().g;
     assert_eq!([g11, g12, g22], [80.0, 30.0, 36.0]);
     let g = Matrix2::new(g11, g12, g12, g22);
     let Gain { k1, k2 } = settings.terminal;
@@ -48,7 +48,7 @@ fn oracle_terminal_law_never_leaves_a_ball_in_the_norm_of_g_but_a_euclidean_one(
 
 #[test]
 fn published_bounds_of_lemma_1() {
-    let (ours, printed) = (constants(&settings()), Published::crmpc2022());
+    let (ours, printed) = (constants(&settings()), published());
     assert_eq!(
         [printed.r0, printed.r1, printed.omega, printed.condition],
         [1.0846, 0.0873, 0.1511, 2.6094]
@@ -69,7 +69,7 @@ fn published_r0_is_not_the_norm_of_the_matrix() {
 
 #[test]
 fn published_tube_and_terminal_radii() {
-    let (ours, printed) = (constants(&settings()), Published::crmpc2022());
+    let (ours, printed) = (constants(&settings()), published());
     assert_eq!([printed.c, printed.epsilon1, printed.epsilon2], [0.0835, 0.2096, 0.0770]);
     assert_digits(ours.c, printed.c, 4);
     assert_digits(ours.epsilon1, printed.epsilon1, 4);
@@ -78,7 +78,7 @@ fn published_tube_and_terminal_radii() {
 
 #[test]
 fn published_peak_of_the_step_response_belongs_to_another_gain() {
-    let printed = Published::crmpc2022().c;
+    let printed = published().c;
     assert_digits(step_response_peak(gain(-10.0)).unwrap(), printed, 4);
     // The gain that the text names gives another number.
     assert_digits(step_response_peak(gain(-5.0)).unwrap(), 0.1525, 4);
@@ -100,7 +100,7 @@ fn oracle_second_terminal_radius_with_the_triangle_inequality() {
     // (13) has − r̄₁ x̄_tube where the triangle inequality gives + r̄₁ x̄_tube.
     let settings = settings();
     let ours = constants(&settings);
-    let printed = Published::crmpc2022();
+    let printed = published();
     let [g11, g12, g22] = printed.g;
     let eigenvalues = Matrix2::new(g11, g12, g12, g22).symmetric_eigenvalues();
     let terminal_gain = settings.terminal.k1.hypot(settings.terminal.k2);

@@ -1,8 +1,8 @@
 //! Bounds of the sampled error dynamics compared with simulation.
 
-use super::{assert_digits, gain, settings};
+use super::{assert_digits, gain, published, settings};
 use control::DesignError;
-use control::crmpc::{Constraints, Design, Published, Settings, step_response_peak};
+use control::crmpc::{Constraints, Design, Settings, step_response_peak};
 use control::error_dynamics::{Gain, Reach, SampledError, response};
 use nalgebra::Vector2;
 use proptest::prelude::*;
@@ -94,7 +94,7 @@ fn oracle_marginal_gain_is_refused_with_its_spectral_radius() {
 fn oracle_constant_disturbance_reaches_the_peak_of_the_step_response_only() {
     // (24) and (26): c̄Δ̄ bounds the rate under a constant Δ. One change of sign after settling
     // doubles it.
-    let c = Published::crmpc2022().c;
+    let c = published().c;
     let mut simulation = Simulation::new(gain(-10.0), 1e-4);
     let mut peak = |disturbance: f64| {
         let mut peak = 0.0f64;
