@@ -1,5 +1,6 @@
 //! The orchestrator: runs the command of the command line, and ends with its exit code.
 
+mod accepted;
 mod arguments;
 mod campaign;
 mod catalogue;

@@ -1,5 +1,6 @@
 //! The command `margins`.
 
+use crate::accepted;
 use crate::arguments::Subject;
 use crate::failure::Failure;
 use crate::picture;
@@ -38,11 +39,29 @@ pub(crate) struct PrintMargins {
     /// File for a Nichols plot of the return ratio and a plot of the sensitivity (.svg).
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
+    /// Print instead which bounds the controller's guarantee accepts, without a flight: the largest
+    /// disturbance and the like, with the gains as they are set and by rule.
+    #[arg(long, conflicts_with_all = ["at", "open", "model", "plot"])]
+    guarantee: bool,
     #[command(flatten)]
     pub(crate) subject: Subject,
 }
 
 impl PrintMargins {
+    fn print_accepted(&self, out: &mut impl Write, interrupt: &Interrupt) -> Result<(), Failure> {
+        let (mut system, _) = self.subject.system(&self.subject.path()?)?;
+        let guarantee = system.experiment.observe.guarantee.clone();
+        let asked = guarantee.and_then(|guarantee| guarantee.accepted).ok_or_else(|| {
+            let problem = "--guarantee: the experiment has no [observe.guarantee.accepted]";
+            Error::experiment(problem)
+        })?;
+        let answers = accepted::answers(&mut system, &asked, interrupt)?;
+        if self.json {
+            return Ok(writeln!(out, "{:#}", json!(answers))?);
+        }
+        Ok(accepted::write(&answers, out)?)
+    }
+
     fn linearise(&self, interrupt: &Interrupt) -> Result<Linearised, Failure> {
         let (system, _) = self.subject.system(&self.subject.path()?)?;
         let asked = system.experiment.observe.margins.clone();
@@ -94,6 +113,9 @@ pub(crate) fn print(
     out: &mut impl Write,
     interrupt: &Interrupt,
 ) -> Result<(), Failure> {
+    if asked.guarantee {
+        return asked.print_accepted(out, interrupt);
+    }
     picture::check(asked.plot.as_deref())?;
     let found = asked.linearise(interrupt)?;
     let margins = margins::margins(&found.open);

@@ -158,10 +158,16 @@ fn guarantee(metrics: &Metrics) -> Option<SummaryLine> {
         let time = rounded(time);
         format!("; while it was in force, an ASSUMPTION did not hold at t = {time} s: {what} > 1")
     });
+    let late = number("late_at").map_or(String::new(), |time| {
+        let time = rounded(time);
+        format!(
+            "; LATE at t = {time} s: the reference not reached for three times the designed time"
+        )
+    });
     let is_within = (broken || !unfounded.is_empty()).then_some(false);
     Some(SummaryLine {
         heading: "guarantee".into(),
-        text: text + defect + &unfounded,
+        text: text + defect + &unfounded + &late,
         is_within,
         ..SummaryLine::default()
     })
@@ -285,6 +291,11 @@ mod tests {
             "in force throughout; while it was in force, an ASSUMPTION did not hold at t = 12.5 s: a.b / a.c > 1"
         );
         assert_eq!(unfounded.is_within, Some(false));
+        let late = guarantee(&metrics(&[&throughout[..], &[("late_at", number(85.0))]].concat()));
+        assert_eq!(
+            late.unwrap().text,
+            "in force throughout; LATE at t = 85 s: the reference not reached for three times the designed time"
+        );
         // Only a defect is a verdict on the limits.
         assert_eq!(without_margins.is_within, None);
         assert_eq!(guarantee(&metrics(&broken)).unwrap().is_within, Some(false));

@@ -108,6 +108,7 @@ impl Log {
             {
                 return;
             }
+            Ok(Status::Error) if warnings::is_silent() => return,
             _ => {}
         }
         let (may_print, lost) = self.pace.lock().count();

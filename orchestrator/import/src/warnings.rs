@@ -22,6 +22,8 @@ struct Warning {
 struct Collected {
     now: f64,
     warnings: Vec<Warning>,
+    /// Whether nothing of it is printed.
+    is_silent: bool,
 }
 
 thread_local! {
@@ -37,12 +39,17 @@ pub fn collect() -> Collection {
     Collection(())
 }
 
-/// A guard: warnings of this thread's instances are dropped as long as this value lives.
+/// A guard: warnings and errors of this thread's instances are dropped as long as this value lives.
 pub struct Silence(Option<Collected>);
 
-/// Begins to drop warnings, such as those of an instance that is disturbed on purpose.
+/// Begins to drop warnings and errors, such as those of an instance that is disturbed on purpose.
 pub fn silence() -> Silence {
-    Silence(COLLECTED.replace(Some(Collected::default())))
+    Silence(COLLECTED.replace(Some(Collected { is_silent: true, ..Collected::default() })))
+}
+
+/// Returns whether messages of this thread's instances are dropped.
+pub(crate) fn is_silent() -> bool {
+    COLLECTED.with_borrow(|collection| collection.as_ref().is_some_and(|one| one.is_silent))
 }
 
 impl Drop for Silence {
@@ -79,7 +86,7 @@ pub fn warn(text: &str) {
 /// Records a warning of an instance. Returns whether there was room for it.
 pub(crate) fn collected(text: &str) -> bool {
     COLLECTED.with_borrow_mut(|collection| {
-        let Some(Collected { now, warnings }) = collection else { return false };
+        let Some(Collected { now, warnings, .. }) = collection else { return false };
         if let Some(warning) = warnings.iter_mut().find(|warning| warning.text == text) {
             warning.count += 1;
         } else if warnings.len() < MOST {

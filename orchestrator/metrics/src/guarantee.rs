@@ -2,10 +2,13 @@
 //! kept then.
 
 use cosim::error::Error;
-use cosim::experiment::Guarantee;
+use cosim::experiment::{Guarantee, Late};
 use cosim::run::{Observer, Sample};
 use cosim::signal::Resolved;
 use cosim::system::{Probed, System};
+
+/// Multiple of the designed time after which an arrival at the reference is late.
+const LATE: f64 = 3.0;
 
 /// Variables in which a controller reports whether its guarantee is in force.
 #[derive(Clone, Debug, Default)]
@@ -23,6 +26,19 @@ pub struct GuaranteeSignals {
     pub keeps: Vec<Resolved>,
     /// Signals, with their texts, that the guarantee assumes not to exceed 1.
     pub assumes: Vec<(String, Resolved)>,
+    /// What counts as a late arrival at the reference.
+    pub late: Option<LateSignals>,
+}
+
+/// Variables that tell a late arrival at the reference.
+#[derive(Clone, Debug)]
+pub struct LateSignals {
+    /// Signals whose norm is small at the reference.
+    pub signals: Vec<Resolved>,
+    /// Largest norm with which the reference counts as reached, in the unit of the signals.
+    pub beyond: f64,
+    /// Index of the variable with the designed time.
+    pub time: usize,
 }
 
 /// The first tick at which the guarantee was no longer in force.
@@ -51,6 +67,10 @@ pub struct GuaranteeRecord {
     /// First time at which an assumption did not hold while the guarantee was in force (s), and the
     /// index of its signal.
     pub unfounded: Option<(f64, usize)>,
+    /// Time since which the guarantee has been in force and the reference not reached, s.
+    away: Option<f64>,
+    /// First time at which the arrival at the reference was late, s.
+    pub late: Option<f64>,
 }
 
 /// Returns the smaller value. Unlike `f64::min` it does not hide a value that is not a number.
@@ -93,6 +113,14 @@ impl GuaranteeSignals {
         };
         signals.keeps = of_list(&guarantee.keeps)?.into_iter().map(|(_, signal)| signal).collect();
         signals.assumes = of_list(&guarantee.assumes)?;
+        let way = of_list(&guarantee.late.as_ref().map(|late| late.signals.clone()))?;
+        if let Some(Late { beyond, time, .. }) = &guarantee.late
+            && !is_left_out(time, system)
+        {
+            let signals_of_way = way.into_iter().map(|(_, signal)| signal).collect();
+            let time = system.probe(time)?.place;
+            signals.late = Some(LateSignals { signals: signals_of_way, beyond: *beyond, time });
+        }
         Ok(Some(signals))
     }
 }
@@ -109,6 +137,22 @@ impl GuaranteeRecord {
         let margins = vec![None; self.signals.margins.len()];
         let signals = std::mem::take(&mut self.signals);
         *self = Self { signals, margins, ..Self::default() };
+    }
+
+    /// Notes the first time at which the reference has not been reached for too long.
+    fn observe_way(&mut self, Sample { time, values, .. }: &Sample) {
+        let Some(LateSignals { signals, beyond, time: designed }) = &self.signals.late else {
+            return;
+        };
+        let squares = signals.iter().map(|signal| signal.value(values).powi(2));
+        if squares.sum::<f64>().sqrt() <= *beyond || !self.is_in_force(values) {
+            self.away = None;
+            return;
+        }
+        let since = *self.away.get_or_insert(*time);
+        if time - since > LATE * values[*designed] {
+            self.late.get_or_insert(*time);
+        }
     }
 
     /// Returns the share of the ticks at which the guarantee was in force; `None` before the first
@@ -151,6 +195,7 @@ impl Observer for GuaranteeRecord {
         let begins = u64::from(!sample.last);
         self.ticks += begins;
         self.status = self.signals.status.as_ref().map(|status| values[status.place]);
+        self.observe_way(sample);
         if self.is_in_force(values) {
             self.ticks_in_force += begins;
             for (smallest, (_, place)) in self.margins.iter_mut().zip(&self.signals.margins) {
@@ -182,7 +227,7 @@ mod tests {
             status: Some(Probed { place: 1, ..Probed::default() }),
             margins: vec![("rate".into(), 2), ("moment".into(), 3)],
             keeps: vec![keeps(4), keeps(5)],
-            assumes: Vec::new(),
+            ..GuaranteeSignals::default()
         });
         for (tick, row) in rows.iter().enumerate() {
             let mut values = *row;
@@ -244,6 +289,27 @@ mod tests {
         let broken = [[1.0, 0.5, 0.2, 0.6], [1.0, 0.5, 0.0, 0.6], [1.0, 0.5, 0.0, 9.0]];
         assert_eq!(unfounded(&broken), Some((1.0, 1)));
         assert_eq!(unfounded(&[[1.0, f64::NAN, 1.0, 0.0]]), Some((0.0, 1)));
+    }
+
+    #[test]
+    fn an_arrival_is_late_after_three_times_the_designed_time() {
+        let late = |rows: &[[f64; 3]]| {
+            let signals = vec![Resolved::variable(1)];
+            let late = Some(LateSignals { signals, beyond: 10.0, time: 2 });
+            let signals = GuaranteeSignals { late, ..GuaranteeSignals::default() };
+            let mut record = GuaranteeRecord::new(signals);
+            for (tick, values) in rows.iter().enumerate() {
+                let (tick, time) = (tick as u64, 1e9 + 2.0 * tick as f64);
+                record.observe(&Sample { tick, time, last: false, values }).unwrap();
+            }
+            record.late
+        };
+        // In force, distance, designed time.
+        let away = [1.0, 11.0, 1.9];
+        assert_eq!(late(&[away; 4]), Some(1e9 + 6.0));
+        assert_eq!(late(&[[1.0, 11.0, 2.0]; 4]), None);
+        assert_eq!(late(&[away, away, [1.0, 10.0, 1.9], away, away, away]), None);
+        assert_eq!(late(&[away, away, [0.0, 11.0, 1.9], away, away, away]), None);
     }
 
     #[test]

@@ -150,7 +150,8 @@ fn guarantee_names(guarantee: &Guarantee) -> Vec<String> {
     let broken = guarantee.keeps.iter().map(|_| "broken".into());
     let unfounded = guarantee.assumes.iter().flat_map(|_| ["unfounded", "unfounded_at"]);
     let names = ["share", "lost_at", "status"].into_iter().chain(unfounded).map(String::from);
-    let names = names.chain(margins).chain(broken);
+    let late = guarantee.late.iter().map(|_| "late_at".into());
+    let names = names.chain(margins).chain(broken).chain(late);
     names.map(|name| format!("guarantee_{name}")).collect()
 }
 
@@ -364,6 +365,7 @@ impl Meters {
                 if !record.signals.keeps.is_empty() {
                     set("broken", Some(Value::Flag(record.broken)));
                 }
+                set("late_at", record.late.map(Value::Number));
                 if let Some((time, index)) = record.unfounded {
                     set("unfounded", Some(Value::Text(record.signals.assumes[index].0.clone())));
                     set("unfounded_at", Some(Value::Number(time)));

@@ -181,6 +181,52 @@ fn a_law_that_counts_on_another_delay_is_warned_of_in_one_line() {
 }
 
 #[test]
+fn oracle_the_bounds_that_a_guarantee_accepts_are_told_without_a_flight() {
+    // The model refuses a gain of 100 and more; the input is 1 at first, and the margin
+    // 1 - input/largest.
+    let bench = observed(
+        r#"
+[observe.guarantee]
+in_force = "gain.guarantee.inForce"
+[observe.guarantee.accepted]
+largest = ["gain.gain", "gain.delay"]
+smallest = ["gain.largest"]
+told = ["gain.guarantee.rateMargin"]
+leaving = ["gain.guarantee.rateMargin", 0.5]
+with = { "gain.largest" = 5.0 }
+by_rule = { "gain.largest" = 1.0 }
+"#,
+    );
+    let call = ["margins", "loop.toml", "--guarantee", "--set", "gain.gain=200"];
+    let (code, table, errors) = bench.call(&call);
+    assert_eq!((code, errors.as_str()), (0, ""));
+    let rows: Vec<Vec<&str>> =
+        table.lines().skip(1).map(|line| line.split_whitespace().collect()).collect();
+    let near_100 = |text: &str| (99.98..100.0).contains(&text.parse::<f64>().unwrap());
+    assert_eq!(rows[0][..4], ["largest", "gain.gain", "m", "200.0000"]);
+    assert!(near_100(rows[0][4]) && near_100(rows[0][5]), "{table}");
+    // With this gain nothing else is accepted.
+    assert_eq!(rows[1], ["largest", "gain.delay", "s", "0.0000", "none", "none"]);
+    assert_eq!(rows[2], ["smallest", "gain.largest", "m", "1000.0000", "none", "none"]);
+    let condition = ["with", "gain.guarantee.rateMargin", "≥", "0.5", "m"];
+    assert_eq!(rows[3][2..7], condition);
+    assert!(near_100(rows[3][7]) && rows[3][8] == "none", "{table}");
+    assert_eq!(rows[4], ["gain.guarantee.rateMargin", "none", "none"]);
+    let call = ["margins", "loop.toml", "--guarantee", "--json", "--set", "gain.delay=0.5"];
+    let (code, text, _) = bench.call(&call);
+    let answers: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(code, 0);
+    // Every large delay is accepted, and without one the gain is as large as before.
+    assert_eq!((&answers[1]["set"], &answers[1]["by_rule"]), (&0.5.into(), &f64::MAX.into()));
+    assert_eq!(answers[4]["answer"], "largest gain.gain without gain.delay");
+    assert!(answers[4]["as_set"].as_f64().unwrap() > 99.98, "{answers}");
+    assert_eq!((&answers[5]["as_set"], &answers[5]["by_rule"]), (&0.8.into(), &0.0.into()));
+    let (code, _, errors) = Bench::new().call(&["margins", "loop.toml", "--guarantee"]);
+    assert_eq!(code, 2);
+    assert!(errors.contains("the experiment has no [observe.guarantee.accepted]"), "{errors}");
+}
+
+#[test]
 fn oracle_a_guarantee_is_summed_up_and_told() {
     let section = |prefix: &str| {
         format!(

@@ -128,8 +128,10 @@ def margins(
     fmu: Mapping[str, str | os.PathLike[str]] | None = None,
     step: float | None = None,
     law: Law | None = None,
+    guarantee: bool = False,
 ) -> pd.DataFrame:
-    """Computes the stability margins of an experiment at an instant of its run.
+    """Computes the stability margins of an experiment at an instant of its run, or the bounds that a
+    controller's guarantee accepts.
 
     >>> table = margins("lqr", at=10.0, open="plant.moment.*", set={"plant.disturbance.kind": "none"})
     >>> float(table.loc["all together", "disk"].round(2))
@@ -145,6 +147,9 @@ def margins(
         step: Length of the communication step, s.
         law: Law in Python that replaces the controller, as in `experiment`. Its memory is copied
             with the state of the loop, as by `linearise`.
+        guarantee: Whether to tell instead, without a flight, what the guarantee accepts: a row for
+            the largest disturbance bound and the like, and for outputs such as the designed time of
+            a turn, each with the gains as set and by rule. What has no value is not a number.
 
     Returns:
         One row for each signal, with the loops of the others closed, and one for all together:
@@ -157,6 +162,10 @@ def margins(
     Raises:
         OrchestratorError: The experiment was refused, or its run failed.
     """
+    if guarantee:
+        rows = answer(["--guarantee"], name, at, open, set, fmu, step, law)
+        numbers = dict.fromkeys(("set", "as_set", "by_rule"), float)
+        return pd.DataFrame(rows).set_index("answer").astype(numbers)
     found = answer([], name, at, open, set, fmu, step, law)
     rows = found["loops"] + ([found["together"]] if found["together"] else [])
 
@@ -193,7 +202,7 @@ def answer(
     fmu: Mapping[str, str | os.PathLike[str]] | None,
     step: float | None,
     law: Law | None,
-) -> dict[str, Any]:
+) -> Any:
     """The orchestrator's answer."""
     arguments = ["margins", "--json", experiment_path(name), *more]
     arguments += changes(set, fmu, law, at=at, step=step)
@@ -203,8 +212,7 @@ def answer(
     exit_code, error, text = orchestrate(arguments, laws=laws)
     if exit_code != 0:
         raise OrchestratorError(error, exit_code, None)
-    found: dict[str, Any] = json.loads(text)
-    return found
+    return json.loads(text)
 
 
 def open_loop(

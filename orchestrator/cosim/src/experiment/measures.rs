@@ -1,6 +1,6 @@
 //! The signals of a run that an experiment measures, watches and draws.
 
-use super::{Trajectory, Vehicle};
+use super::{Scalar, Trajectory, Vehicle};
 use crate::signal::Signal;
 use fmi_master::names;
 use schemars::JsonSchema;
@@ -194,12 +194,52 @@ pub struct Guarantee {
     /// Name of a list of signals, as errors over the largest that are declared, which the guarantee
     /// assumes not to exceed 1.
     pub assumes: Option<String>,
+    /// What counts as a late arrival at the reference while the guarantee is in force.
+    pub late: Option<Late>,
+    /// Parameters whose accepted values `margins --guarantee` looks for.
+    pub accepted: Option<Accepted>,
     /// Group of variables that show the plan that is followed, for the page of a run: `began`, and
     /// `time`, `rate`, `rateBound`, `moment` and `momentBound` with an index.
     pub plan: Option<String>,
     /// Whether the FMUs may lack `in_force`, `status` and the margins.
     #[serde(default)]
     pub optional: bool,
+}
+
+/// A late arrival: the norm of signals stays above a bound for three times a time that the design
+/// tells.
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Late {
+    /// Name of the list of signals whose norm decides.
+    pub signals: String,
+    /// Largest norm with which the reference counts as reached, in the display unit of the signals.
+    pub beyond: f64,
+    /// Variable with the designed time, s.
+    pub time: String,
+}
+
+/// Parameters whose accepted values `margins --guarantee` looks for: those with which the instances
+/// can be initialized.
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Accepted {
+    /// Parameters whose largest values are told. That of the first is also told with each of the
+    /// others set to zero.
+    pub largest: Vec<Signal>,
+    /// Parameters whose smallest values are told.
+    pub smallest: Vec<Signal>,
+    /// Outputs that are told as they are after initialization.
+    pub told: Vec<Signal>,
+    /// Output with its least value, with which the first parameter is told once more.
+    pub leaving: Option<(Signal, f64)>,
+    /// Values of parameters with which bounds are refused that are too large.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, Scalar>")]
+    pub with: BTreeMap<String, toml::Value>,
+    /// Values of parameters with which the rest is left to a rule of the design.
+    #[schemars(with = "BTreeMap<String, Scalar>")]
+    pub by_rule: BTreeMap<String, toml::Value>,
 }
 
 /// Condition under which a run is lost and ends, or under which it has missed its goal. Of signals

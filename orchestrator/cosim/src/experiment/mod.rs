@@ -15,7 +15,9 @@ mod vehicle;
 pub use crate::watch::OnInvalid;
 pub use fmi_master::wiring::Coupling;
 pub use interface::Interface;
-pub use measures::{Curve, Guarantee, Loss, Margins, Measure, MeasureKind, Observe, Panel, Scaled};
+pub use measures::{
+    Accepted, Curve, Guarantee, Late, Loss, Margins, Measure, MeasureKind, Observe, Panel, Scaled,
+};
 pub use overrides::{Overrides, Process, name_of};
 pub use protection::Protection;
 pub use quantity::{Band, Quantity};
