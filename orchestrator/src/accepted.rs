@@ -24,6 +24,7 @@ const PART: f64 = 0.25;
 const FAR: f64 = 1e6;
 
 type Changes = Vec<(Target, SettingValue)>;
+type Ask<'a> = dyn Fn(&Trial) -> Result<Option<f64>, Error> + 'a;
 
 /// An answer with the parameters as they are set, and by the rule of the design. There is none if
 /// nothing is accepted; the largest number says that every large one is.
@@ -166,7 +167,6 @@ impl Questions {
             changes: changes.clone(),
             leaving: None,
         });
-        type Ask<'a> = dyn Fn(&Trial) -> Result<Option<f64>, Error> + 'a;
         let mut rows = Vec::new();
         let mut add = |answer: String, shown: &Resolved, set, ask: &Ask| {
             let (as_set, by_rule) = (ask(&as_set)?, ask(&by_rule)?);
