@@ -31,6 +31,17 @@ def test_margins_are_a_table():
     assert lost.to_numpy() == pytest.approx(0.04, abs=2e-3)
 
 
+def test_bounds_that_the_guarantee_accepts_are_a_table():
+    table = margins("crmpc-robust", set={"controller.inertia.error": 0.0}, guarantee=True)
+    assert table.columns.tolist() == ["unit", "set", "as_set", "by_rule"]
+    bound = table.loc["largest controller.disturbance.bound"]
+    # docs/guarantee.md has these without the error of the inertia.
+    assert (bound["set"], bound["unit"]) == (pytest.approx(2.0), "deg/s2")
+    assert [bound["as_set"], bound["by_rule"]] == pytest.approx([2.5526, 2.8862], abs=1e-3)
+    assert table.loc["smallest controller.limit.moment", "set"] == 135600.0
+    assert (table.loc["controller.guarantee.turnTime", ["as_set", "by_rule"]] > 20.0).all()
+
+
 def test_a_loop_that_is_unstable_has_no_rows():
     table = margins("lqr", at=1.0, open=OPEN, set={**QUIET, "plant.actuation.delay": 0.45})
     assert not table.attrs["stable"] and table.empty and table.attrs["spectral_radius"] > 1.0

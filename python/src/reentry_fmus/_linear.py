@@ -165,7 +165,8 @@ def margins(
     if guarantee:
         rows = answer(["--guarantee"], name, at, open, set, fmu, step, law)
         numbers = dict.fromkeys(("set", "as_set", "by_rule"), float)
-        return pd.DataFrame(rows).set_index("answer").astype(numbers)
+        table = pd.DataFrame(rows).set_index("answer").astype(numbers)
+        return table[["unit", *numbers]]
     found = answer([], name, at, open, set, fmu, step, law)
     rows = found["loops"] + ([found["together"]] if found["together"] else [])
 
