@@ -125,10 +125,7 @@ fn wrong_requests_are_refused_by_name() {
         (json!({"plant.nothing": 1}), "plant.nothing: there is no such parameter"),
         (json!({"planet.x": 1}), "planet: the experiment has no such component"),
         (json!({"plant.disturbance.kind": "pink"}), "has no item \"pink\""),
-        (
-            json!({"plant.disturbance.bound": "2 kg"}),
-            "plant.disturbance.bound: the FMU defines no unit",
-        ),
+        (json!({"plant.disturbance.bound": "2 kg"}), "bound: the FMU defines no unit"),
         (json!({"plant.disturbance.bound": -1}), "disturbance.bound"),
         (json!({"plant.disturbance.seed": 1.5}), "must be an integer"),
         (json!({"controller.period.feedback": 0.03}), "controller.period.feedback: stop = 50 s"),

@@ -1,18 +1,8 @@
 //! CRMPC with the robust set reaches a reference that jumps and then stays, and its guarantee stays
 //! in force on the way: from rest and in motion, without and with a delay of the loop.
 
-use crate::harness::flight::{Flight, Random, Waveform};
-use crate::harness::{in_parallel, settings};
-use control::controller::{Controller, Forecast, Measurement, Preview};
-use control::crmpc::{Constraints, Crmpc, GuaranteeStatus, Memory, Settings};
-use control::delay::{Delayed, Latency};
-use nalgebra::Vector3;
-use std::f64::consts::PI;
-use vehicle::Scenario;
-use vehicle::disturbance::DisturbanceKind;
-use vehicle::plant::{Config, Plant};
-use vehicle::profile::Profile;
-use vehicle::reference::Reference;
+use crate::prelude::*;
+use vehicle::plant::Config;
 
 const PERIOD: f64 = 0.04;
 /// Time of the jump, s.

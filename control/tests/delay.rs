@@ -1,22 +1,12 @@
 //! Prediction over a known delay: it is exact with the right model, far better than no prediction,
 //! and has no effect without a delay.
 
-use crate::harness::recording::{
-    assert_a_saved_memory_continues, assert_another_evaluation_leaves_no_trace,
-};
-use crate::harness::{FEEDBACK, disturbance, lqr, settings};
+use crate::prelude::*;
 use control::closed_loop::fly;
-use control::controller::{ReferenceAt, saturated};
-use control::crmpc::{Constraints, Settings};
-use control::delay::{Latency, Memory, Predictor};
-use control::lqr::LqrSettings;
-use control::{Controller, Crmpc, Delayed, DesignError, Lqr, Measurement};
-use nalgebra::Vector3;
+use control::controller::ReferenceAt;
+use control::delay::Memory;
 use vehicle::Error;
-use vehicle::disturbance::{Disturbance, DisturbanceKind};
-use vehicle::plant::{Plant, State, state};
-use vehicle::reference::Reference;
-use vehicle::scenario::Scenario;
+use vehicle::plant::{State, state};
 
 const DELAYS: [f64; 5] = [0.04, 0.1, 0.117, 0.12, 0.003];
 
@@ -108,10 +98,6 @@ impl Late {
     }
 }
 
-fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
-}
-
 /// Returns the largest distance (rad, rad/s) of a predicted state from the actual one, over 10 s.
 fn largest_error<C: Controller>(mut late: Late, mut controller: Delayed<C>, period: f64) -> f64 {
     let mut predicted = Vec::new();
@@ -149,13 +135,6 @@ fn oracle_saturated_commands_are_predicted_as_they_act() {
     assert!(knowing < 1e-9 && unknowing > 1e-3, "{knowing:e}, {unknowing:e}");
 }
 
-/// Returns the regulator with another weight on the input. A weight of 0.3 makes it four times as
-/// fast as the paper's 10.
-fn regulator(q: f64) -> Lqr {
-    let Settings { body, p, .. } = settings(Constraints::Robust);
-    Lqr::new(LqrSettings { body, p, q: [q; 3], period: 0.04 }).unwrap()
-}
-
 #[test]
 fn oracle_the_loop_moves_as_one_without_delay_that_begins_later() {
     // At rest and without a moment the vehicle's state is constant until the first command acts.
@@ -176,28 +155,6 @@ fn oracle_the_loop_moves_as_one_without_delay_that_begins_later() {
             let moment = law.update(&mut (), 0, time, &measured, &|time| reference.at(time));
             plant.advance(time, time + 0.04, moment).unwrap();
         }
-    }
-}
-
-/// Returns EMS (deg) and CMS (1) of a fast regulator over 50 s.
-fn merit(delay: f64, predicts: bool, scale: f64) -> Result<[f64; 2], Error> {
-    let mut late = Late::new(delay, scale, disturbance(DisturbanceKind::White));
-    let mut controller = delayed(regulator(0.3), if predicts { delay } else { 0.0 });
-    let errors = late.run(&mut controller, FEEDBACK, 50.0, |_, _, _| {})?;
-    let limit = Scenario::crmpc2022().limit_moment;
-    let efforts: Vec<f64> = late.commands.iter().map(|(_, moment)| moment.norm() / limit).collect();
-    Ok([rms(&errors), rms(&efforts)])
-}
-
-#[test]
-fn a_loop_that_a_delay_makes_unstable_is_stable_with_prediction() {
-    for scale in crate::harness::INERTIA_SCALES {
-        assert!(
-            matches!(merit(0.1, false, scale), Err(Error::Singular { .. })),
-            "the attitude is not lost"
-        );
-        let (none, with) = (merit(0.0, false, scale).unwrap(), merit(0.1, true, scale).unwrap());
-        assert!(with[0] < 1.1 * none[0] && with[1] < 1.05 * none[1], "{with:?} {none:?}");
     }
 }
 

@@ -1,12 +1,7 @@
 //! Tests of the estimate of the delay of a loop.
 
-use control::controller::{Controller, Measurement};
-use control::crmpc::{Constraints, Contradiction, Crmpc, Guarantee, GuaranteeStatus, Settings};
-use control::delay::{Delayed, Latency, Memory};
-use nalgebra::Vector3;
-use vehicle::Scenario;
-use vehicle::disturbance::DisturbanceKind;
-use vehicle::plant::Plant;
+use crate::prelude::*;
+use control::delay::Memory;
 
 const PERIOD: f64 = 0.04;
 

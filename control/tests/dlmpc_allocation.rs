@@ -1,12 +1,9 @@
 //! No tick of DLMPC allocates memory, apart from the inside of the cone solver.
 #![allow(unsafe_code)]
 
-use control::dlmpc::{Memory, Settings, SolverStatus};
-use control::{Controller, Dlmpc, Measurement};
+use crate::prelude::*;
+use control::dlmpc::{Memory, Settings};
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-use vehicle::disturbance::DisturbanceKind;
-use vehicle::scenario::Scenario;
 
 thread_local! {
     static COUNT: Cell<usize> = const { Cell::new(0) };
@@ -36,16 +33,9 @@ fn ticks_without_the_cone_solver_allocate_nothing() {
     let scenario = Scenario::crmpc2022();
     let mut truth: Vec<Measurement> = Vec::new();
     let mut controller = Dlmpc::new(Settings::published()).unwrap();
-    let noise = crate::harness::disturbance(DisturbanceKind::White);
-    crate::harness::simulate(
-        &mut controller,
-        &mut Memory::default(),
-        1.05,
-        noise,
-        |_, _, &measured| {
-            truth.push(measured);
-        },
-    );
+    let noise = disturbance(DisturbanceKind::White);
+    let mut memory = Memory::default();
+    simulate(&mut controller, &mut memory, 1.05, noise, |_, _, &now| truth.push(now));
 
     let reference = |time: f64| scenario.reference.at(time);
     let mut memory = controller.memory();
@@ -56,13 +46,8 @@ fn ticks_without_the_cone_solver_allocate_nothing() {
     for (tick, measured) in (0..).zip(&truth) {
         let counted = COUNT.get();
         before.clone_from(&memory);
-        controller.update(
-            &mut memory,
-            tick,
-            tick as f64 * crate::harness::FEEDBACK,
-            measured,
-            &reference,
-        );
+        let time = tick as f64 * FEEDBACK;
+        controller.update(&mut memory, tick, time, measured, &reference);
         assert_eq!(COUNT.get() - counted, 0, "tick {tick}");
         if tick % controller.ratio() == 0 {
             unconstrained += usize::from(memory.report.status == SolverStatus::Unconstrained);

@@ -1,12 +1,8 @@
 //! The status of the guarantee where the assumptions are violated: a limit may only be exceeded
 //! while the guarantee is not in force. It stays in force while they are true.
 
-use crate::harness::flight::{BEGIN, Fault, Flight, Random, Shown, Sight, Slow, Stuck, Waveform};
-use crate::harness::{in_parallel, settings};
-use control::crmpc::{Constraints, Settings};
-use control::error_dynamics::Gain;
-use nalgebra::{Matrix3, Vector3};
-use vehicle::profile::Profile;
+use crate::harness::flight::{BEGIN, Fault, Stuck};
+use crate::prelude::*;
 
 /// Settings under which faults are flown, with the age of the measurements, s.
 fn situations() -> [(&'static str, Settings, f64); 5] {
@@ -241,7 +237,7 @@ fn the_table_of_faults() {
 #[test]
 #[ignore = "minutes: for the figures of docs/guarantee.md"]
 fn no_alarm_is_false_in_a_thousand_flights() {
-    for (i, (name, settings, age)) in situations().iter().enumerate() {
+    for (i, (_name, settings, age)) in situations().iter().enumerate() {
         let flights: Vec<Flight> = (0..250)
             .map(|seed| {
                 let random = &mut Random::new(seed);
@@ -251,11 +247,7 @@ fn no_alarm_is_false_in_a_thousand_flights() {
             })
             .collect();
         for (flight, shown) in flights.iter().zip(in_parallel(&flights, Flight::fly)) {
-            assert!(
-                shown.withdrawn.is_none() && !shown.broken,
-                "{name}, {}: {shown:?}",
-                flight.seed
-            );
+            assert!(shown.withdrawn.is_none() && !shown.broken, "{}: {shown:?}", flight.seed);
         }
     }
 }

@@ -1,10 +1,6 @@
 //! Remark 3 of Chai 2022: a longer horizon enlarges the set of starts from which a plan exists.
 
-use crate::harness::flight::Random;
-use crate::harness::settings;
-use control::crmpc::{Constraints, Memory, Settings, SolverStatus};
-use control::{Controller, Crmpc, Measurement};
-use vehicle::scenario::Scenario;
+use crate::prelude::*;
 
 /// Number of starts that are drawn, with angles within 60° of the reference and rates within the
 /// limit of 5°/s.

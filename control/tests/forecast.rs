@@ -1,9 +1,7 @@
 //! The forecast of a reference that is given from outside.
 
-use control::controller::{Forecast, Preview};
-use nalgebra::Vector3;
+use crate::prelude::*;
 use proptest::prelude::*;
-use vehicle::reference::Reference;
 
 fn vector(range: std::ops::Range<f64>) -> impl Strategy<Value = Vector3<f64>> {
     prop::array::uniform3(range).prop_map(Vector3::from)

@@ -1,20 +1,10 @@
 //! The guarantee of the robust set in closed loops: it is in force throughout, and it holds.
 //! `orchestrator campaign` flies many more cases.
 
-use crate::harness::flight::{
-    Flight, Random, Shown, Sight, Tried, Waveform, assert_kept, optimised_every, random_settings,
-    tried,
-};
-use crate::harness::{constant, in_parallel, run, settings};
-use control::Measurement;
-use control::crmpc::{Constraints, Guarantee, Settings};
-use control::delay::Predictor;
-use control::error_dynamics::Gain;
-use nalgebra::Vector3;
-use vehicle::disturbance::Disturbance;
+use crate::harness::flight::{Tried, optimised_every, random_settings, tried};
+use crate::harness::{constant, run};
+use crate::prelude::*;
 use vehicle::integrator::rk4;
-use vehicle::kinematics::Kinematics;
-use vehicle::plant::{self, Load};
 
 /// Returns flights with disturbances of every kind and both inertia errors, from the start of Chai
 /// 2022.

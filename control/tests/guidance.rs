@@ -23,16 +23,6 @@ fn regress_the_nominal_flights_end_in_the_terminal_area() {
     }
 }
 
-/// Density, lift and drag are wrong by up to 10 %, and the wind blows with up to 50 m/s.
-#[test]
-fn regress_dispersed_flights_end_in_the_terminal_area() {
-    for number in 2000..2010 {
-        let flight = Flight::dispersed(0.1, uniform(2, number));
-        let outcome = fly(&Settings::default(), &flight, |_, _, _| {});
-        assert!(outcome.arrived(), "{flight:?}: {} m to go", outcome.range);
-    }
-}
-
 /// At the last tick the verdict is the result of the flight. A target in reach at the first tick is
 /// reached, if the vehicle is as the guidance expects. A near target may be reached although no
 /// plan does so at first, because later plans hold the largest bank angle for longer.

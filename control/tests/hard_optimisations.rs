@@ -2,17 +2,9 @@
 //! disturbed starts, and infeasible problems.
 
 use crate::harness::draws::Case;
-use crate::harness::flight::Random;
-use crate::harness::{Optimising, disturbance, in_parallel, settings, simulate};
-use control::crmpc::{Constraints, GuaranteeStatus, Memory, Settings, SolverReport, SolverStatus};
+use crate::prelude::*;
 use control::linearise::InverseKinematics;
-use control::mpc::SolverSettings;
-use control::{Controller, Crmpc, Dlmpc, Measurement, dlmpc};
-use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
-use vehicle::disturbance::DisturbanceKind;
-use vehicle::kinematics;
-use vehicle::scenario::Scenario;
 
 fn crmpc(constraints: Constraints) -> Crmpc {
     Crmpc::new(settings(constraints)).unwrap()
@@ -55,28 +47,6 @@ fn regress_the_longest_of_20000_random_optimisations_take_no_more_iterations() {
     assert_takes_no_more("robust", &mut crmpc(Constraints::Robust));
     assert_takes_no_more("paper", &mut crmpc(Constraints::Paper));
     assert_takes_no_more("dlmpc", &mut Dlmpc::new(dlmpc::Settings::published()).unwrap());
-}
-
-#[test]
-fn regress_starts_that_once_took_hundreds_of_iterations_take_some_thirty() {
-    // The cases include a first guess with ‖y‖² of 118 and one that occurred in an FMU. They once
-    // took 228, 241 and 249 iterations.
-    let scenario = Scenario::crmpc2022();
-    let angles = scenario.reference.at(31.35).angles + degrees([-14.34, -1.84, 0.35]);
-    let body_rates = kinematics::r(&angles) * degrees([1.91, -3.46, 0.31]);
-    let cases = [
-        Case::of_the_paper(22.2, [-10.9, 1.0, 0.2], [-1.2, -3.3, 0.3]),
-        Case::of_the_paper(31.35, [-14.34, -1.84, 0.35], body_rates.map(f64::to_degrees).into()),
-        Case::of_the_paper(38.42, [1.93, -13.99, -1.49], [-0.11, 1.27, 3.31]),
-    ];
-    for case in cases {
-        let [cold, ..] = case.optimise(&mut crmpc(Constraints::Robust), 1);
-        assert!(has_optimum(&cold) && cold.iterations <= 40, "{cold:?}");
-    }
-}
-
-fn degrees(values: [f64; 3]) -> Vector3<f64> {
-    Vector3::from(values.map(f64::to_radians))
 }
 
 #[test]
@@ -172,14 +142,6 @@ fn a_budget_of_iterations_is_never_exceeded_and_costs_no_limit() {
             assert!(memory.report.exhausted > 0 && most == budget, "{context}");
         }
     }
-}
-
-#[test]
-fn a_run_with_a_budget_of_iterations_repeats_bit_for_bit() {
-    let [first, second] = [0; 2].map(|_| budgeted(4, DisturbanceKind::White).1);
-    let timeless =
-        |memory: Memory| Memory { report: SolverReport { time: 0.0, ..memory.report }, ..memory };
-    assert_eq!(timeless(first), timeless(second));
 }
 
 proptest! {

@@ -1,17 +1,10 @@
 //! Loops in which the air's static moments act, with and without these as inputs of the laws.
 
-use control::Crmpc;
-use control::controller::{Controller, Measurement};
-use control::crmpc::{Constraints, GuaranteeStatus, Settings};
-use control::delay::{self, Delayed, Latency};
-use control::lqr::{Lqr, LqrSettings};
-use nalgebra::Vector3;
-use vehicle::Scenario;
+use crate::prelude::*;
+use control::delay;
 use vehicle::actuators::Command;
 use vehicle::aerodynamics::{Aerodynamics, Flow};
-use vehicle::disturbance::DisturbanceKind;
-use vehicle::plant::{Config, Input, Plant};
-use vehicle::profile::Profile;
+use vehicle::plant::Config;
 
 const PERIOD: f64 = 0.04;
 

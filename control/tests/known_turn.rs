@@ -1,16 +1,7 @@
 //! Loops while the trajectory turns, with and without the turn as an input of the laws.
 
-use control::Crmpc;
-use control::controller::{Controller, Measurement};
-use control::crmpc::{Constraints, Contradiction, GuaranteeStatus, Settings};
-use control::lqr::{Lqr, LqrSettings};
-use nalgebra::Vector3;
-use vehicle::Scenario;
+use crate::prelude::*;
 use vehicle::actuators::Command;
-use vehicle::disturbance::DisturbanceKind;
-use vehicle::plant::{Input, Plant};
-use vehicle::profile::Profile;
-use vehicle::trajectory::Trajectory;
 
 const PERIOD: f64 = 0.04;
 
@@ -107,29 +98,6 @@ fn oracle_the_rate_itself_keeps_its_limit_while_the_trajectory_turns() {
         largest = largest.max(rate);
     }
     assert!(largest > 0.9, "{largest}");
-}
-
-#[test]
-fn oracle_a_turn_that_is_known_leaves_little_of_the_error() {
-    let mut scenario = Scenario::crmpc2022();
-    scenario.disturbance.kind = DisturbanceKind::None;
-    scenario.inertia_scale = 1.0;
-    let largest = |turn, is_known| {
-        let Settings { body, p, q, period_feedback: period, .. } =
-            Settings::new(Constraints::Robust);
-        let mut law = Lqr::new(LqrSettings { body, period, p, q }).unwrap();
-        let mut largest = 0.0_f64;
-        fly(&mut law, &scenario, turn, is_known, |(), time, plant| {
-            let error = plant.angles() - scenario.reference.at(time + PERIOD).angles;
-            // From when the error of the start, and that of the jump at 25 s, is gone.
-            if (15.0..25.0).contains(&time) || time > 40.0 {
-                largest = largest.max(error.norm().to_degrees());
-            }
-        });
-        largest
-    };
-    let (calm, known, untold) = (largest(0.0, true), largest(0.35, true), largest(0.35, false));
-    assert!(known - calm < 0.1 * (untold - calm), "{calm} {known} {untold}");
 }
 
 #[test]

@@ -1,14 +1,7 @@
 //! A measurement that is not finite is refused by every law, and leaves no trace.
 
-use crate::harness::{FEEDBACK, lqr, settings};
-use control::crmpc::Constraints;
-use control::delay::{Delayed, Latency};
-use control::sliding::{FblSettings, Settings, Tvsmc};
-use control::two_loop::TwoLoopSettings;
-use control::{Btvsmc, Controller, Crmpc, Dlmpc, Fbl, Measurement, SotvsmcDo, TwoLoopSmc, dlmpc};
-use nalgebra::Vector3;
-use vehicle::Scenario;
-use vehicle::plant::Plant;
+use crate::prelude::*;
+use control::sliding::Settings;
 
 /// Returns the measurement with one of its numbers replaced.
 fn replaced(measured: &Measurement, place: usize, by: f64) -> Measurement {

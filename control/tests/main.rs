@@ -22,6 +22,7 @@ mod lost_measurement;
 mod navigation;
 mod optimisation;
 mod platform_functions;
+mod prelude;
 mod scheduled_limits;
 mod shown_plan;
 mod sliding;

@@ -1,14 +1,11 @@
 //! Navigation of entry flights: the error against what the filter predicts, in flights whose
 //! sensors and winds are drawn.
 
-use crate::harness::navigated::{Case, Figures, fly};
+use crate::harness::navigated::{Case, Figures, exceeded, faulty, fly};
+use crate::prelude::*;
 use control::navigation::{Contradiction, Health, Line, Memory, Navigation, Settings};
-use nalgebra::Vector3;
-use std::f64::consts::PI;
-use vehicle::fault::{Fault, FaultKind};
+use vehicle::fault::FaultKind;
 use vehicle::fixes::Fixes;
-use vehicle::noise::uniform;
-use vehicle::triad::Window;
 
 fn figures(case: impl Fn(u64) -> Case + Sync, seeds: std::ops::Range<u64>) -> Figures {
     let seeds: Vec<u64> = seeds.collect();
@@ -126,14 +123,6 @@ fn health_names_a_filter_that_expects_too_much() {
     assert!(healths.contains(&Health::Inconsistent));
 }
 
-/// Returns a flight whose receiver (0), star tracker (1) or inertial unit (2) has a fault.
-fn faulty(device: usize, kind: FaultKind, size: f64, window: [f64; 2], seed: u64) -> Case {
-    let mut case = Case::new(4, device == 1, seed);
-    let [start, end] = window;
-    case.faults[device] = Fault { kind, window: Window { start, end }, size };
-    case
-}
-
 const FOR_EVER: f64 = 1e9;
 
 /// Fixes that come up to a second late, with the right time, are as good as those in time.
@@ -191,7 +180,7 @@ fn faults_are_survived_and_said() {
 
 /// Without a fault the errors are within the bounds that are stated at 99 % of the instants, and in
 /// most flights at all of them; these bounds are no larger than three deviations of what is declared
-/// to CRMPC. With `FLIGHTS` flights a fault, it prints the table of docs/entry.md.
+/// to CRMPC. The example `protection` prints the table of docs/entry.md.
 #[test]
 fn errors_are_within_their_protection() {
     let seeds: Vec<u64> = (700..708).collect();
@@ -201,60 +190,6 @@ fn errors_are_within_their_protection() {
         let all: Vec<f64> =
             [0, 1].map(|i| flown.iter().map(|one| one[i]).sum::<f64>() / 8.0).into();
         assert!(all[0] < 0.01 && all[1] < 0.01, "{stars}: {flown:?}");
-    }
-}
-
-/// Returns the shares of the instants at which an angle or the position is wrong by more than its
-/// bound.
-fn exceeded(case: &Case) -> [f64; 2] {
-    let (mut count, mut beyond) = (0.0, [0.0; 2]);
-    fly(case, |seen| {
-        count += 1.0;
-        for (sum, is_within) in beyond.iter_mut().zip(seen.is_protected()) {
-            *sum += f64::from(u8::from(!is_within));
-        }
-    });
-    beyond.map(|sum| sum / count)
-}
-
-#[test]
-#[ignore = "minutes: for the table of docs/entry.md"]
-fn the_table_of_protection() {
-    use FaultKind::{
-        Accelerometer, Attitude, Clock, Dropout, Frozen, Gyroscope, Late, None, Position, Velocity,
-    };
-    let flights = std::env::var("FLIGHTS").map_or(20, |text| text.parse().unwrap());
-    let seeds: Vec<u64> = (900..900 + flights).collect();
-    for (device, kind, size) in [
-        (0, None, 1.0),
-        (0, Frozen, 1.0),
-        (0, Dropout, 1.0),
-        (0, Late, 1.0),
-        (0, Clock, 1.0),
-        (0, Position, 1.0),
-        (0, Velocity, 1.0),
-        (1, Attitude, 0.2),
-        (1, Attitude, 1.0),
-        (1, Frozen, 1.0),
-        (2, Gyroscope, 0.01),
-        (2, Gyroscope, 0.1),
-        (2, Accelerometer, 0.01),
-        (2, Accelerometer, 0.1),
-    ] {
-        let flown = crate::harness::in_parallel(&seeds, |&seed| {
-            let [start, length] = uniform(seed, 55).map(|draw: f64| 0.5 + 0.5 * draw);
-            let window = [1500.0 * start, 1500.0 * start + 600.0 * length];
-            exceeded(&faulty(device, kind, size, window, seed))
-        });
-        let mean = [0, 1].map(|i| flown.iter().map(|one| one[i]).sum::<f64>() / flown.len() as f64);
-        let hit = [0, 1].map(|i| flown.iter().filter(|one| one[i] > 0.0).count());
-        println!(
-            "| {device} {kind:?} {size} | {:.3} % {} | {:.3} % {} |",
-            100.0 * mean[0],
-            hit[0],
-            100.0 * mean[1],
-            hit[1]
-        );
     }
 }
 

@@ -3,17 +3,11 @@
 //! no optimisation here has such a cone. These three are counted here in place of the C library's.
 #![allow(unsafe_code)]
 
-use crate::harness::{Optimising, disturbance, settings, simulate};
-use control::allocation::{self, Allocator, Command};
-use control::crmpc::{self, Constraints, Settings};
-use control::dlmpc;
-use control::mpc::{Method, SolverSettings};
-use control::report::SolverStatus;
-use control::{Crmpc, Dlmpc};
-use nalgebra::Vector3;
-use std::cell::Cell;
+use crate::prelude::*;
+use control::allocation::{self, Command};
+use control::crmpc;
+use control::mpc::Method;
 use std::hint::black_box;
-use vehicle::disturbance::DisturbanceKind;
 use vehicle::math;
 
 thread_local! {
@@ -49,15 +43,10 @@ extern "C" fn pow(x: f64, y: f64) -> f64 {
 /// Flies the scenario and asserts that the cone solver finds every plan.
 fn fly<C: Optimising>(mut controller: C) {
     let mut memory = controller.memory();
-    simulate(
-        &mut controller,
-        &mut memory,
-        1.05,
-        disturbance(DisturbanceKind::White),
-        |memory, _, _| {
-            assert_eq!(C::report(memory).status, SolverStatus::Cone);
-        },
-    );
+    let noise = disturbance(DisturbanceKind::White);
+    simulate(&mut controller, &mut memory, 1.05, noise, |memory, _, _| {
+        assert_eq!(C::report(memory).status, SolverStatus::Cone);
+    });
 }
 
 #[test]
@@ -72,12 +61,9 @@ fn the_cone_solver_takes_no_exp_log_or_pow_from_the_platform() {
 
     let mut memory = allocation::Memory::default();
     let moment = Vector3::new(1e4, 2e4, -1e4);
-    Allocator::new(allocation::Settings::published()).unwrap().update(
-        &mut memory,
-        0,
-        0.0,
-        &Command { moment, dynamic_pressure: 2859.0, ..Command::default() },
-    );
+    let command = Command { moment, dynamic_pressure: 2859.0, ..Command::default() };
+    let mut allocator = Allocator::new(allocation::Settings::published()).unwrap();
+    allocator.update(&mut memory, 0, 0.0, &command);
     assert_eq!(memory.report.status, allocation::AllocationStatus::Optimal);
 
     assert_eq!(CALLS.get(), 0);

@@ -1,16 +1,9 @@
 //! Limit on the moment and bound on the disturbance that change during a flight, as with dynamic
 //! pressure.
 
-use crate::harness::flight::{Flight, Shown, Waveform, assert_kept};
-use crate::harness::{INERTIA_SCALES, in_parallel};
-use control::controller::{Controller, Measurement, Scheduled, saturated};
-use control::crmpc::{
-    Constraints, Contradiction, Crmpc, Design, GuaranteeStatus, InitialState, Settings,
-};
-use control::lqr::{Lqr, LqrSettings};
-use nalgebra::Vector3;
-use std::f64::consts::TAU;
-use vehicle::reference::Reference;
+use crate::harness::INERTIA_SCALES;
+use crate::prelude::*;
+use control::controller::Scheduled;
 
 /// Shares of the limit and of the bound that are there at `time`, once up and down in 40 s.
 fn shares(time: f64) -> (f64, f64) {

@@ -1,13 +1,9 @@
 //! The plan that CRMPC shows, with the bounds that its certificate has checked: what a picture of
 //! the guarantee draws.
 
-use crate::harness::flight::Random;
-use crate::harness::settings;
+use crate::prelude::*;
 use control::closed_loop::fly;
-use control::crmpc::{Constraints, GuaranteeStatus, Memory, PlanPoint, Settings, points};
-use control::{Controller, Crmpc};
-use vehicle::disturbance::DisturbanceKind;
-use vehicle::scenario::Scenario;
+use control::crmpc::{PlanPoint, points};
 
 /// Number of flights, and length of each, s.
 const FLIGHTS: u64 = 100;

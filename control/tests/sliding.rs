@@ -1,12 +1,7 @@
 //! The sliding-mode controllers of Wu et al. (2015) on the paper's scenario.
 
-use control::delay::{Delayed, Latency};
-use control::sliding::{BoundaryLayer, FblSettings, Observer, Settings, Surface, Tvsmc};
-use control::{Btvsmc, Controller, Fbl, Measurement, SotvsmcDo};
-use nalgebra::Vector3;
-use vehicle::kinematics;
-use vehicle::plant::Plant;
-use vehicle::scenario::Scenario;
+use crate::prelude::*;
+use control::sliding::Settings;
 
 /// Figures of merit of one run.
 struct Outcome {

@@ -1,16 +1,8 @@
 //! The two-loop sliding-mode controller on the scenario of Jia et al.
 
-use control::delay::{Delayed, Latency};
+use crate::prelude::*;
 use control::sliding::FiniteTimeLayer;
-use control::two_loop::{Form, Loop, OuterKinematics, TwoLoopMemory, TwoLoopSettings};
-use control::{Controller, Measurement, TwoLoopSmc};
-use nalgebra::{Matrix3, Vector3};
-use vehicle::kinematics;
-use vehicle::kinematics::Kinematics;
-use vehicle::plant::{self, Load, Plant};
-use vehicle::profile::Profile;
-use vehicle::reference::Reference;
-use vehicle::scenario::Scenario;
+use control::two_loop::{Form, Loop, OuterKinematics, TwoLoopMemory};
 
 /// Figures of merit of one run.
 #[derive(Debug, Default)]

@@ -1,17 +1,6 @@
 //! The guarantee of the robust set while the errors of the measured angles change slowly.
 
-use crate::harness::flight::{Flight, Random, Shown, Sight, Slow, Waveform, assert_kept};
-use crate::harness::{in_parallel, settings};
-use control::crmpc::{Constraints, Crmpc, Design, GuaranteeStatus, InitialState, Memory, Settings};
-use control::{Controller, Measurement};
-use nalgebra::Vector3;
-use vehicle::actuators::Command;
-use vehicle::kinematics;
-use vehicle::plant::{Input, Plant};
-use vehicle::profile::Profile;
-use vehicle::reference::Reference;
-use vehicle::scenario::Scenario;
-use vehicle::trajectory::Trajectory;
+use crate::prelude::*;
 
 /// Returns the settings for errors of an inertial navigation: of the angles up to 0.3°, which
 /// change by up to 0.046°/s, and small ones from tick to tick.
@@ -165,67 +154,5 @@ fn slow_errors_that_are_not_declared_can_end_the_guarantee() {
         let ended = shown.iter().filter(|shown| shown.withdrawn.is_some()).count();
         assert!(shown.iter().all(|shown| !shown.broken && !shown.assumed));
         assert!(ended >= least, "{ended} of {}", shown.len());
-    }
-}
-
-/// Flies bank reversals while the trajectory turns as in a guided entry, with slow errors that are
-/// sines of up to 0.3° in angle of attack and sideslip and 0.6° in the bank angle. Returns the
-/// share of the ticks in force.
-fn entry(settings: &Settings, phase: f64) -> f64 {
-    let period = settings.period_feedback;
-    let mut law = Crmpc::new(*settings).unwrap();
-    let mut memory = law.memory();
-    let mut scenario = Scenario::crmpc2022();
-    scenario.disturbance.bound = settings.disturbance_bound - f64::to_radians(0.15);
-    scenario.duration = 100.0;
-    let attitude = |alpha: f64, sigma: f64| Vector3::new(alpha, 0.0, sigma).map(f64::to_radians);
-    let reference = Profile::step(attitude(38.0, 60.0), attitude(32.0, -55.0), 30.0);
-    scenario.initial_angles = attitude(38.0, 60.0);
-    let mut config = scenario.config(0.01);
-    config.earth_rate = 0.0;
-    let mut plant = Plant::new(&config, 0.0).unwrap();
-    let trajectory = |time: f64| Trajectory {
-        heading_rate: f64::to_radians(0.35) * (0.1 * time).cos(),
-        flight_path_angle_rate: f64::to_radians(-0.046),
-        ..Trajectory::default()
-    };
-    let sizes = Vector3::new(0.3, 0.3, 0.6).map(f64::to_radians);
-    let mut random = Random::new(phase.to_bits());
-    let (ticks, mut in_force) = ((scenario.duration / period).round() as u64, 0);
-    for tick in 0..ticks {
-        let time = tick as f64 * period;
-        // The rate of change of each error is at most 0.046°/s.
-        let slow = sizes.map(|size| {
-            let turn = time * f64::to_radians(0.046) / size + phase;
-            size * turn.sin()
-        });
-        let fast = random.vector() * settings.angle_error;
-        let rates = plant.rates() + random.vector() * (0.5 * settings.rate_error);
-        let angles = plant.angles() + slow + fast;
-        let measured = Measurement { angles, rates, ..Measurement::default() };
-        let measured = measured.relative_to(&trajectory(time).turn_rate(0.0));
-        let moment = law.update(&mut memory, tick, time, &measured, &|time| reference.at(time));
-        let input = |time| Input { moment, trajectory: trajectory(time), ..Input::default() };
-        plant.advance_with(time, time + period, &Command::default(), input).unwrap();
-        if memory.supervision.status == GuaranteeStatus::InForce {
-            in_force += 1;
-            assert!(
-                plant.rates().norm() <= settings.limit_rate
-                    && moment.norm() <= settings.limit_moment
-            );
-        }
-    }
-    f64::from(in_force) / ticks as f64
-}
-
-#[test]
-fn guarantee_is_kept_with_slow_errors_along_an_entry() {
-    let turn_change = f64::to_radians(0.1);
-    // The errors of the attitude change the turn that the law computes.
-    let slow_angle_rate = f64::to_radians(0.05);
-    let settings = Settings { turn_change, slow_angle_rate, ..navigated(0.0) };
-    for phase in [0.0, 1.0, 2.0, 3.0, 4.0, 5.0] {
-        let in_force = entry(&settings, phase);
-        assert!(in_force == 1.0, "{phase}: {in_force}");
     }
 }

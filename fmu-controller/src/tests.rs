@@ -201,16 +201,6 @@ fn oracle_a_known_trajectory_is_taken_out_of_the_rates() {
 }
 
 #[test]
-fn a_measurement_that_is_not_finite_is_an_error_not_a_number() {
-    let mut instance: Lqr = ready(|_| ());
-    instance.input.angles.y = f64::NAN;
-    let Err(Failure::Error(text)) = instance.calculate(0.0, LastEvent::InputSet) else {
-        panic!("accepted")
-    };
-    assert!(text.contains("not finite"), "{text}");
-}
-
-#[test]
 fn oracle_a_known_moment_is_left_out_of_the_command_before_its_limit() {
     let told = |known: Vector3<f64>, saturation: bool| {
         let mut instance = ready::<Lqr>(|instance| {

@@ -32,16 +32,3 @@ impl<W: Write> Write for Plain<W> {
         self.0.flush()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn control_characters_are_shown_as_escapes() {
-        let mut out = Plain(Vec::new());
-        write!(out, "a\u{1b}[2J\tb\u{9b}1m\r\nü").unwrap();
-        let expected = "a\\u{1b}[2J\tb\\u{9b}1m\\r\nü";
-        assert_eq!(String::from_utf8(out.0).unwrap(), expected);
-    }
-}

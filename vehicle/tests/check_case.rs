@@ -3,14 +3,8 @@
 //! brick with three different moments of inertia falls over the rotating Earth without any moment.
 //! The numbers are those of tool SIM 4, published with the report (`Atmos_02_sim_04.csv`).
 
-use nalgebra::{Matrix3, Rotation3, Vector3};
-use vehicle::actuators::Command;
-use vehicle::disturbance::Disturbance;
-use vehicle::dynamics::Inertia;
-use vehicle::kinematics::Kinematics;
-use vehicle::plant::{self, Config, Input, Plant};
-use vehicle::scenario::Scenario;
-use vehicle::trajectory::Trajectory;
+use crate::prelude::*;
+use vehicle::plant;
 
 /// Unit of the inertia, kg m². As no moment acts it does not change the motion.
 const SLUG_FT2: f64 = 1.3558179483;

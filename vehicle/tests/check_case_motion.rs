@@ -2,13 +2,11 @@
 //! Verification of 6-Degree-of-Freedom Flight Vehicle Simulations, volume II) that need the motion
 //! of the centre of mass. The numbers are those of tool SIM 4 (`Atmos_03_sim_04.csv` and so on).
 
-use nalgebra::{SVector, Vector3};
+use crate::prelude::*;
 use vehicle::Vehicle;
-use vehicle::aerodynamics::{FOOT, Flow};
+use vehicle::aerodynamics::FOOT;
 use vehicle::atmosphere::air;
-use vehicle::dynamics::Inertia;
-use vehicle::integrator::rk4;
-use vehicle::translation::{AirAcceleration, Motion, Planet, State, derivative};
+use vehicle::translation::{State, derivative};
 
 /// Slug, kg.
 const SLUG: f64 = 14.593_902_937_206_36;

@@ -1,16 +1,9 @@
 //! Tests of R of Chai 2022 (2) against its properties and numerical differentiation, and of Wu 2015
 //! (1) against a composition of rotations.
 
-use nalgebra::{Matrix3, Rotation3, Vector3};
+use crate::prelude::*;
 use proptest::prelude::*;
-use vehicle::kinematics::Kinematics;
 use vehicle::kinematics::{r, r_dot, r_inverse, sines};
-use vehicle::trajectory::Trajectory;
-
-fn attitude() -> impl Strategy<Value = Vector3<f64>> {
-    (-3.0..3.0, -1.4..1.4, -3.0..3.0)
-        .prop_map(|(alpha, beta, sigma)| Vector3::new(alpha, beta, sigma))
-}
 
 proptest! {
     #[test]

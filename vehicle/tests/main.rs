@@ -7,6 +7,7 @@ mod entry;
 mod kinematics;
 mod plant;
 mod platform;
+mod prelude;
 mod reference;
 mod sensors;
 mod turntable;

@@ -1,12 +1,12 @@
 //! Tests of the sensors and their line, effect by effect, against values computed by hand and the
 //! statistics of the noise.
 
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use crate::prelude::*;
+use nalgebra::UnitQuaternion;
 use vehicle::fault::{Fault, FaultKind};
 use vehicle::fixes::Devices;
 use vehicle::frames::Place;
 use vehicle::platform::Readings;
-use vehicle::sensor_data::SensorData;
 use vehicle::sensors::{Config, Felt, Line, PerSensor, Sample, Sensors};
 use vehicle::triad::{Triad, Window};
 
@@ -47,16 +47,6 @@ fn run(sensors: &mut Sensors, count: u32, signal: impl Fn(f64) -> Readings) -> V
             sensors.arrived()
         })
         .collect()
-}
-
-#[test]
-fn the_embedded_data_can_be_used_and_ideal_sensors_have_no_errors() {
-    let data = SensorData::embedded();
-    assert_eq!(data.ideal, PerSensor::default());
-    data.surroundings.check().unwrap();
-    let config =
-        Config { triads: data.mems, line: data.line, devices: Devices::default(), seed: 1 };
-    Sensors::new(&config, 0.0).unwrap();
 }
 
 #[test]
@@ -105,23 +95,6 @@ fn published_data_sheet_values_of_the_mems_set() {
     near(field.norm(), 5.0940e-5);
     near(field.y.atan2(field.x).to_degrees(), -13.6891);
     near((field.z / field.norm()).asin().to_degrees(), 65.9899);
-}
-
-#[test]
-fn oracle_a_magnetometer_shows_soft_iron_times_field_plus_hard_iron() {
-    let soft = Matrix3::new(1.1, 0.05, -0.02, 0.03, 0.9, 0.04, -0.01, 0.02, 1.05);
-    let hard = Vector3::new(3e-5, -2e-5, 1e-5);
-    let mut sensors = with(|config| {
-        config.triads[2].matrix = soft;
-        config.triads[2].bias = hard;
-    });
-    let field = Vector3::new(2e-5, -1e-5, 4e-5);
-    sensors.take(0.0, &[Vector3::x(), Vector3::y(), field]);
-    let [x, y, z] = sensors.arrived().readings;
-    // 1.1·2 − 0.05 − 0.08 + 3; 0.06 − 0.9 + 0.16 − 2; −0.02 − 0.02 + 4.2 + 1
-    let expected = Vector3::new(5.07e-5, -2.68e-5, 5.16e-5);
-    assert!((z - expected).amax() < 1e-19, "{z}");
-    assert_eq!([x, y], [Vector3::x(), Vector3::y()]);
 }
 
 #[test]
@@ -293,19 +266,6 @@ fn a_dropped_sample_leaves_a_gap_in_the_numbers_and_the_one_before_in_place() {
 }
 
 #[test]
-fn oracle_samples_are_dropped_as_often_as_set() {
-    const COUNT: u32 = 20_000;
-    let mut sensors = with(|config| config.line.drop_probability = 0.3);
-    let mut numbers: Vec<i32> =
-        run(&mut sensors, COUNT, uniform).iter().map(|sample| sample.number).collect();
-    numbers.retain(|&number| number > 0);
-    numbers.dedup();
-    let n = f64::from(COUNT);
-    let share = 1.0 - numbers.len() as f64 / n;
-    assert!((share - 0.3).abs() < 5.0 * (0.3 * 0.7 / n).sqrt(), "{share}");
-}
-
-#[test]
 fn a_frozen_sensor_repeats_its_value_while_the_samples_count_on() {
     let mut sensors = with(|config| {
         config.triads[2].noise = 1.0;
@@ -377,10 +337,7 @@ fn oracle_each_fault_acts_in_its_window() {
                 (FaultKind::Restart, _) => 3,
                 _ => 0,
             };
-            assert!(
-                (due - arrived - missing).abs() <= 1 - i32::from(device < 2),
-                "{name}: {arrived}"
-            );
+            assert!((due - arrived - missing).abs() <= i32::from(device == 2), "{name}: {arrived}");
             assert_ne!(now, sound, "{name}");
         }
     }

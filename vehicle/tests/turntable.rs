@@ -1,13 +1,10 @@
 //! Tests of the turntable against a servo that is integrated in small steps, and against values
 //! computed by hand.
 
-use nalgebra::Vector3;
+use crate::prelude::*;
 use proptest::prelude::*;
 use std::f64::consts::TAU;
-use vehicle::kinematics::Kinematics;
-use vehicle::platform::Pose;
 use vehicle::sensors::Instant;
-use vehicle::trajectory::Trajectory;
 use vehicle::turntable::{Config, Turntable};
 
 const PERIOD: f64 = 0.01;
@@ -17,17 +14,6 @@ fn table(config: Config) -> Turntable {
     Turntable::new(&config).unwrap().unwrap()
 }
 
-fn vehicle(angles: Vector3<f64>) -> Pose {
-    Pose {
-        specific_force: None,
-        kinematics: Kinematics::Printed,
-        angles,
-        rates: Vector3::zeros(),
-        alpha_rate: 0.0,
-        trajectory: Trajectory::default(),
-    }
-}
-
 fn tick(k: u32) -> Instant {
     Instant { tick: k.into(), time: f64::from(k) * PERIOD }
 }
@@ -35,11 +21,11 @@ fn tick(k: u32) -> Instant {
 /// Pose of a turntable after samples of the vehicle's angles.
 fn followed(config: Config, samples: &[Vector3<f64>]) -> Pose {
     let mut table = table(config);
-    let mut pose = vehicle(samples[0]);
+    let mut pose = at_rest(samples[0]);
     for (k, &angles) in (0..).zip(samples) {
         let at = tick(k);
-        pose = table.pose(at, &vehicle(angles), &Vector3::zeros());
-        table.follow(at, &vehicle(angles));
+        pose = table.pose(at, &at_rest(angles), &Vector3::zeros());
+        table.follow(at, &at_rest(angles));
     }
     pose
 }
@@ -111,19 +97,6 @@ fn oracle_a_fast_servo_stands_where_the_vehicle_does() {
 }
 
 #[test]
-fn oracle_a_jump_is_followed_at_the_rate_limit() {
-    let mut samples = vec![Vector3::zeros(); 2];
-    samples.extend([Vector3::new(0.5, 0.0, -0.5); 21]);
-    let pose = followed(SERVO, &samples);
-    // The limit is reached when the command has moved by rate · τ; until then the angle lags.
-    assert!((pose.angles.x - 0.2).abs() < 0.01, "{}", pose.angles.x);
-    let one_more = followed(SERVO, &[samples.as_slice(), &samples[22..]].concat());
-    assert!((one_more.angles.x - pose.angles.x - SERVO.rate * PERIOD).abs() < 1e-14);
-    let angle_rates = Kinematics::Exact.r(&pose.angles) * pose.rates;
-    assert!((angle_rates - Vector3::new(1.0, 0.0, -1.0)).amax() < 1e-14, "{angle_rates}");
-}
-
-#[test]
 fn the_command_is_rounded_to_the_converters_step() {
     let config = Config { resolution: 0.01, ..SERVO };
     let held = [Vector3::new(0.0149, -0.0151, 1.0)];
@@ -137,8 +110,8 @@ fn a_sample_that_is_taken_again_replaces_the_last_one() {
     let mut once = table(SERVO);
     let mut again = table(SERVO);
     for k in 0..20 {
-        let pose = vehicle(Vector3::repeat(0.02 * f64::from(k * k)));
-        again.follow(tick(k), &vehicle(Vector3::repeat(9.0)));
+        let pose = at_rest(Vector3::repeat(0.02 * f64::from(k * k)));
+        again.follow(tick(k), &at_rest(Vector3::repeat(9.0)));
         for table in [&mut once, &mut again] {
             table.follow(tick(k), &pose);
         }
@@ -149,7 +122,7 @@ fn a_sample_that_is_taken_again_replaces_the_last_one() {
 #[test]
 fn oracle_the_turn_of_the_trajectory_is_felt_as_on_the_vehicle() {
     let turn = Vector3::new(0.01, -0.02, 0.03);
-    let pose = vehicle(Vector3::new(0.2, -0.3, 0.5));
+    let pose = at_rest(Vector3::new(0.2, -0.3, 0.5));
     let shown = table(SERVO).pose(tick(0), &pose, &turn);
     // The angles rest: R ω = -T times the turn.
     let exact = Kinematics::Exact;

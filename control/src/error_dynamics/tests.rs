@@ -34,7 +34,7 @@ fn assert_agree(computed: &[Reach], expected: &[[f64; 7]], tolerance: f64) {
         for (value, expected) in values.iter().zip(expected) {
             assert!(
                 (value - expected).abs() <= tolerance * (1.0 + expected),
-                "tick {n}: {value} {expected}"
+                "{n}: {value} {expected}"
             );
         }
     }

@@ -1,9 +1,7 @@
 //! The gain K of the robust set by rule, and how far the guarantee reaches with it.
 
 use super::gain;
-use control::DesignError;
-use control::crmpc::{Constraints, Design, Guarantee, Settings};
-use control::error_dynamics::Gain;
+use crate::prelude::*;
 
 const DOCUMENT: &str = include_str!("../../../docs/guarantee.md");
 

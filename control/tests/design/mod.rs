@@ -6,9 +6,8 @@ mod gain;
 mod printed;
 mod sampled;
 
-use control::crmpc::{Constraints, Design, Settings, held_terminal_weight, terminal_weight};
-use control::error_dynamics::{Gain, SampledError};
-use nalgebra::{Matrix2, Vector2};
+use crate::prelude::*;
+use control::crmpc::held_terminal_weight;
 use serde::Deserialize;
 
 /// The constants that Chai 2022, section 5.1 prints for its own design.
@@ -49,10 +48,7 @@ fn gain(k: f64) -> Gain {
 #[track_caller]
 fn assert_digits(value: f64, printed: f64, decimals: i32) {
     let tolerance = 0.5 * 10f64.powi(-decimals) * (1.0 + 1e-9);
-    assert!(
-        (value - printed).abs() <= tolerance,
-        "{value} is not {printed} to {decimals} decimals"
-    );
+    assert!((value - printed).abs() <= tolerance, "{value} {printed} ({decimals} decimals)");
 }
 
 #[test]

@@ -1,11 +1,8 @@
 //! The numbers printed in Chai 2022, section 5.1.
 
 use super::{assert_digits, gain, published, settings};
-use control::crmpc::{
-    Constraints, Design, PaperConstants, Settings, step_response_peak, terminal_weight,
-};
-use control::error_dynamics::Gain;
-use nalgebra::{Matrix2, Vector2};
+use crate::prelude::*;
+use control::crmpc::{PaperConstants, step_response_peak};
 
 fn constants(settings: &Settings) -> PaperConstants {
     Design::new(settings).unwrap().paper.unwrap()

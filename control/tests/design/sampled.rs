@@ -1,10 +1,9 @@
 //! Bounds of the sampled error dynamics compared with simulation.
 
 use super::{assert_digits, gain, published, settings};
-use control::DesignError;
-use control::crmpc::{Constraints, Design, Settings, step_response_peak};
-use control::error_dynamics::{Gain, Reach, SampledError, response};
-use nalgebra::Vector2;
+use crate::prelude::*;
+use control::crmpc::step_response_peak;
+use control::error_dynamics::{Reach, response};
 use proptest::prelude::*;
 
 /// Returns the limit of [`SampledError::reach`] for infinitely many periods.

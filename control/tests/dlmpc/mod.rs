@@ -4,12 +4,9 @@
 mod inner_layer;
 mod outer_layer;
 
-use crate::harness::recording::{
-    assert_a_saved_memory_continues, assert_another_evaluation_leaves_no_trace,
-};
-use crate::harness::{in_parallel, simulate, white};
-use control::Dlmpc;
-use control::dlmpc::{Memory, Settings, SolverReport};
+use crate::harness::flown;
+use crate::prelude::*;
+use control::dlmpc::{Memory, Settings};
 
 fn dlmpc() -> Dlmpc {
     Dlmpc::new(Settings::published()).unwrap()
@@ -58,16 +55,7 @@ fn tuned_gains_spend_less_moment_at_no_larger_error() {
     let mean = |settings: Settings| {
         let cases: Vec<_> =
             white(21..=26, 0.04).into_iter().filter(|case| case.inertia_scale > 1.0).collect();
-        let outcomes = in_parallel(&cases, |case| {
-            let (scale, noise) = (case.inertia_scale, case.disturbance.clone());
-            simulate(
-                &mut Dlmpc::new(settings).unwrap(),
-                &mut Memory::default(),
-                scale,
-                noise,
-                |_, _, _| {},
-            )
-        });
+        let outcomes = in_parallel(&cases, |case| flown(&mut Dlmpc::new(settings).unwrap(), case));
         let n = outcomes.len() as f64;
         let ems_deg = outcomes.iter().map(|outcome| outcome.ems_deg).sum::<f64>() / n;
         (ems_deg, outcomes.iter().map(|outcome| outcome.cms).sum::<f64>() / n)

@@ -1,16 +1,10 @@
 //! The outer layer: its optimum, its shortcuts and its fallback.
 
 use super::dlmpc;
-use crate::harness::recording::{Interrupted, Recorded, recorded, reference};
-use crate::harness::{disturbance, simulate};
-use control::dlmpc::{Memory, Settings, SolverStatus};
-use control::mpc::SolverSettings;
-use control::{Controller, Dlmpc, Measurement};
-use nalgebra::{DMatrix, DVector, Vector3};
-use vehicle::disturbance::DisturbanceKind;
+use crate::prelude::*;
+use control::dlmpc::{Memory, Settings};
+use nalgebra::{DMatrix, DVector};
 use vehicle::kinematics::r_inverse;
-use vehicle::reference::Reference;
-use vehicle::scenario::Scenario;
 
 fn optimisations() -> Vec<Recorded<Memory>> {
     recorded(&mut dlmpc(), 1.05, dlmpc().ratio())
@@ -129,11 +123,7 @@ fn shortcuts_change_nothing_along_a_run() {
         counts[usize::from(memory.report.status == SolverStatus::Constrained)] += 1;
         assert_eq!(whole.report.status, SolverStatus::Constrained);
         let (cost, cost_whole) = (memory.report.cost, whole.report.cost);
-        assert!(
-            (cost - cost_whole).abs() <= 1e-7 * cost_whole,
-            "tick {}: {cost} {cost_whole}",
-            sample.tick
-        );
+        assert!((cost - cost_whole).abs() <= 1e-7 * cost_whole, "{cost} {cost_whole}");
         let difference = (memory.rate_command - whole.rate_command).norm() / limit;
         assert!(difference < 1e-4, "tick {}: {difference}", sample.tick);
     }

@@ -4,10 +4,8 @@ use super::CALIBRATED;
 use crate::harness::platform::{
     CALIBRATION_DURATION, CALIBRATION_SEED, calibrated, calibration, lines, mems,
 };
+use crate::prelude::*;
 use control::estimation::{CalibrationMode, CalibrationStatus, Estimator, Health, Settings};
-use nalgebra::{Matrix3, Rotation3};
-use vehicle::platform::body_from_velocity;
-use vehicle::sensor_data::SensorData;
 use vehicle::sensors::PerSensor;
 
 /// Required is ‖W A − I‖ ≤ 5e-3 at a noise of 0.5 %. The noise of the set is 0.6 %, without the
@@ -32,18 +30,8 @@ fn regress_the_corrections_in_the_data_file_are_those_of_the_flight() {
     let corrections = calibrated(&mems(CALIBRATION_SEED), CALIBRATION_DURATION).corrections;
     for (correction, file) in corrections.iter().zip(CALIBRATED.corrections.iter()) {
         let size = file.matrix.norm();
-        assert!(
-            (correction.matrix - file.matrix).norm() < 1e-9 * size,
-            "{} {}",
-            correction.matrix,
-            file.matrix
-        );
-        assert!(
-            (correction.bias - file.bias).norm() < 1e-9 / size.min(1.0),
-            "{} {}",
-            correction.bias,
-            file.bias
-        );
+        assert!((correction.matrix - file.matrix).norm() < 1e-9 * size, "{correction:?}");
+        assert!((correction.bias - file.bias).norm() < 1e-9 / size.min(1.0), "{correction:?}");
     }
 }
 

@@ -2,10 +2,8 @@
 
 use super::{CALIBRATED, health_at};
 use crate::harness::platform::{PERIOD, errors, estimates, lines, mems, rest, scenario};
-use control::estimation::{self, Alignment, Health, Settings};
-use nalgebra::{Rotation3, Vector3};
-use vehicle::platform::body_from_velocity;
-use vehicle::scenario::Scenario;
+use crate::prelude::*;
+use control::estimation::{self, Health, Settings};
 use vehicle::triad::Window;
 
 #[test]

@@ -6,13 +6,10 @@ mod faults;
 use crate::harness::platform::{
     PERIOD, Truth, config, errors, estimates, lines, mems, rest, scenario,
 };
-use control::estimation::{Alignment, Estimate, Health, Settings, angles, mems_corrections};
-use nalgebra::{Rotation3, Vector3};
+use crate::prelude::*;
+use control::estimation::{Estimate, Health, Settings, angles, mems_corrections};
 use proptest::prelude::*;
 use std::sync::LazyLock;
-use vehicle::kinematics::Kinematics;
-use vehicle::platform::body_from_velocity;
-use vehicle::sensor_data::SensorData;
 use vehicle::sensors::Config;
 
 /// Settings for the MEMS set, with the corrections of the data file.

@@ -53,13 +53,6 @@ impl Case {
         Self { time: 25.0 + 25.0 * at(0), reference, states }
     }
 
-    /// Returns a flight of Chai 2022 that begins at `time`, s, with these errors of the angles,
-    /// deg, and x_ω, deg/s, at both instants.
-    pub fn of_the_paper(time: f64, angles: [f64; 3], rates: [f64; 3]) -> Self {
-        let state = (degrees(angles), degrees(rates));
-        Self { time, reference: Scenario::crmpc2022().reference, states: [state; 2] }
-    }
-
     /// Returns the case of this seed.
     pub fn random(seed: u64, size: f64) -> Self {
         let random = &mut Random::new(seed);

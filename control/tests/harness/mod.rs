@@ -90,6 +90,12 @@ pub struct Outcome {
     pub moment: f64,
 }
 
+/// Flies a case with a new memory.
+pub fn flown<C: Controller>(law: &mut C, case: &Case) -> Outcome {
+    let (mut memory, disturbance) = (law.memory(), case.disturbance.clone());
+    simulate(law, &mut memory, case.inertia_scale, disturbance, |_, _, _| {})
+}
+
 /// Additional results of a run of CRMPC.
 #[derive(Clone, Debug)]
 pub struct Kept {

@@ -9,7 +9,7 @@ use vehicle::aerodynamics::Aerodynamics;
 use vehicle::air::{Air, ROWS, Row};
 use vehicle::disturbance::{Disturbance, DisturbanceKind};
 use vehicle::entry::{Config, Deviations, End, Following, Prescribed, Trim};
-use vehicle::fault::Fault;
+use vehicle::fault::{Fault, FaultKind};
 use vehicle::fixes::Devices;
 use vehicle::frames::Place;
 use vehicle::kinematics::Kinematics;
@@ -373,4 +373,31 @@ pub(crate) fn fly(case: &Case, mut see: impl FnMut(&Seen)) {
         plant.advance_with(time, time + PERIOD, &Command::default(), moving).unwrap();
     }
     panic!("it does not come down");
+}
+
+/// Returns a flight whose receiver (0), star tracker (1) or inertial unit (2) has a fault.
+pub(crate) fn faulty(
+    device: usize,
+    kind: FaultKind,
+    size: f64,
+    window: [f64; 2],
+    seed: u64,
+) -> Case {
+    let mut case = Case::new(4, device == 1, seed);
+    let [start, end] = window;
+    case.faults[device] = Fault { kind, window: Window { start, end }, size };
+    case
+}
+
+/// Returns the shares of the instants at which an angle or the position is wrong by more than its
+/// bound.
+pub(crate) fn exceeded(case: &Case) -> [f64; 2] {
+    let (mut count, mut beyond) = (0.0, [0.0; 2]);
+    fly(case, |seen| {
+        count += 1.0;
+        for (sum, is_within) in beyond.iter_mut().zip(seen.is_protected()) {
+            *sum += f64::from(u8::from(!is_within));
+        }
+    });
+    beyond.map(|sum| sum / count)
 }

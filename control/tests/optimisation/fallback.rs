@@ -1,15 +1,9 @@
 //! Flights without an optimum: the fallback (31), and the plan that is kept.
 
 use super::{controller, optimisations};
-use crate::harness::recording::{Interrupted, Recorded, reference};
-use crate::harness::{Outcome, disturbance, settings, simulate};
-use control::crmpc::{Constraints, GuaranteeStatus, Memory, Plan, Settings, SolverStatus};
-use control::mpc::SolverSettings;
-use control::{Crmpc, Measurement};
-use nalgebra::Vector2;
-use std::ops::Range;
-use vehicle::disturbance::DisturbanceKind;
-use vehicle::kinematics;
+use crate::harness::Outcome;
+use crate::prelude::*;
+use control::crmpc::Plan;
 
 /// Checks (31) independently: the plan is the one before without its first interval, followed by
 /// one interval under the acceleration `last` of the state before.
@@ -148,19 +142,13 @@ fn run_failing(during: Range<u64>) -> (Outcome, [u32; 2], Memory) {
     // These are optimisations without an optimum, at which the plan was kept or given up.
     let mut fallbacks = [0, 0];
     let mut last = 0;
-    let outcome = simulate(
-        &mut controller,
-        &mut memory,
-        1.05,
-        disturbance(DisturbanceKind::White),
-        |memory, tick, _| {
-            let without =
-                matches!(memory.report.status, SolverStatus::Fallback | SolverStatus::Kept);
-            fallbacks[usize::from(!during.contains(&tick))] +=
-                u32::from(without && memory.report.solves > last);
-            last = memory.report.solves;
-        },
-    );
+    let noise = disturbance(DisturbanceKind::White);
+    let outcome = simulate(&mut controller, &mut memory, 1.05, noise, |memory, tick, _| {
+        let without = matches!(memory.report.status, SolverStatus::Fallback | SolverStatus::Kept);
+        fallbacks[usize::from(!during.contains(&tick))] +=
+            u32::from(without && memory.report.solves > last);
+        last = memory.report.solves;
+    });
     (outcome, fallbacks, memory)
 }
 
@@ -173,10 +161,7 @@ fn a_solver_that_fails_for_a_while_costs_no_limit() {
     let cases = [(10..50, 0), (200..300, 0), (550..660, 0), (0..5, 24), (0..u64::MAX, 24)];
     for (during, most_outside) in cases {
         let (outcome, [inside, outside], memory) = run_failing(during.clone());
-        assert!(
-            inside > 0 && outside <= most_outside,
-            "{during:?}: {inside} fallbacks inside, {outside} outside"
-        );
+        assert!(inside > 0 && outside <= most_outside, "{during:?}: {inside}, {outside}");
         assert!(outcome.rate <= 1.0 && outcome.moment <= 1.0 + 1e-12, "{during:?}: {outcome:?}");
         assert!(outcome.ems_deg < 2.5, "{during:?}: {outcome:?}");
         assert_eq!(memory.report.status, SolverStatus::Unconstrained, "{during:?}");

@@ -4,12 +4,7 @@
 mod fallback;
 mod shortcuts;
 
-use crate::harness::recording::{
-    Recorded, assert_a_saved_memory_continues, assert_another_evaluation_leaves_no_trace, recorded,
-};
-use crate::harness::{Optimising, settings};
-use control::Crmpc;
-use control::crmpc::{Constraints, Memory, SolverReport};
+use crate::prelude::*;
 
 fn controller(constraints: Constraints) -> Crmpc {
     Crmpc::new(settings(constraints)).unwrap()

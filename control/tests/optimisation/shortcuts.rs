@@ -1,17 +1,11 @@
 //! Every shortcut leads to the optimum.
 
 use super::{controller, optimisations};
-use crate::harness::recording::reference;
-use crate::harness::{FEEDBACK, settings};
-use control::crmpc::{Constraints, InitialState, Memory, Settings, SolverReport, SolverStatus};
-use control::mpc::{Method, SolverSettings};
-use control::{Controller, Crmpc, Measurement};
-use nalgebra::{Vector2, Vector3};
+use crate::prelude::*;
+use control::mpc::Method;
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
-use std::cell::{Cell, RefCell};
-use vehicle::kinematics;
-use vehicle::scenario::Scenario;
+use std::cell::RefCell;
 
 /// Returns the controller with the cone program of the whole horizon at every sample.
 fn cone(constraints: Constraints) -> Crmpc {
@@ -102,13 +96,8 @@ fn oracle_off_the_nominal_motion_the_input_changes_by_k_times_the_deviation() {
         let angles = sample.measured.angles + Vector3::new(0.001, -0.002, 0.003);
         let rates = sample.measured.rates + Vector3::new(-0.002, 0.001, 0.0005);
         let time = tick as f64 * FEEDBACK;
-        let moment = controller.update(
-            &mut memory,
-            tick,
-            time,
-            &Measurement { angles, rates, ..Measurement::default() },
-            &reference(),
-        );
+        let measured = Measurement { angles, rates, ..Measurement::default() };
+        let moment = controller.update(&mut memory, tick, time, &measured, &reference());
 
         let angle_rates = kinematics::r(&angles) * rates;
         let nominal = memory.nominal;

@@ -1,7 +1,7 @@
 //! Theorem 10: the boundary layer, with an exact estimate.
 
-use control::sliding::{BoundaryLayer, Reaching, Settings};
-use nalgebra::Vector3;
+use crate::prelude::*;
+use control::sliding::Settings;
 use proptest::prelude::*;
 
 /// Returns V₁ = s·s/2, (37).

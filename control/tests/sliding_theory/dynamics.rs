@@ -1,9 +1,7 @@
 //! (3), (12) and (13): the dynamics with their uncertainties.
 
-use nalgebra::{Matrix3, Vector3};
+use crate::prelude::*;
 use proptest::prelude::*;
-use vehicle::Scenario;
-use vehicle::dynamics::RigidBody;
 use vehicle::kinematics::r;
 
 /// Returns F of (13), as it is printed or as the dynamics require.

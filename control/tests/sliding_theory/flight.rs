@@ -2,13 +2,9 @@
 
 use super::boundary_layer::v1;
 use super::second_order::{Axis, exponent_53};
-use control::sliding::{BoundaryLayer, Memory, Observer, Reaching, SecondOrder, Settings, Tvsmc};
-use control::{Controller, Measurement};
-use nalgebra::Vector3;
-use vehicle::Scenario;
-use vehicle::dynamics::RigidBody;
-use vehicle::kinematics::{Kinematics, r, r_dot, r_inverse};
-use vehicle::plant::{self, Load, Plant};
+use crate::prelude::*;
+use control::sliding::{Memory, Settings};
+use vehicle::kinematics::{r, r_dot, r_inverse};
 
 /// Disturbance moment of section 6, (66), N m.
 fn moment_66(t: f64) -> Vector3<f64> {

@@ -1,8 +1,8 @@
 //! Lemma 2 with (20), the motion on the surface s = 0, and Lemmas 7, 8 and 9.
 
 use super::simpson;
-use control::sliding::{Surface, TrackingError};
-use nalgebra::Vector3;
+use crate::prelude::*;
+use control::sliding::TrackingError;
 use proptest::prelude::*;
 
 /// Returns |e(t)| of (20) over its printed bound |e(0)| exp(−min(c, λ) t).

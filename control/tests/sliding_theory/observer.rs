@@ -1,7 +1,7 @@
 //! Lemma 5: the observer.
 
-use control::sliding::{Estimate, Observer, Settings};
-use nalgebra::Vector3;
+use crate::prelude::*;
+use control::sliding::{Estimate, Settings};
 use proptest::prelude::*;
 
 /// Returns the observer of Table 1 with `l` in place of L.

@@ -1,8 +1,8 @@
 //! Theorem 12: the second-order reaching law, with an exact estimate.
 
 use super::sig;
-use control::sliding::{Reaching, SecondOrder, SecondOrderForm, Settings};
-use nalgebra::{Matrix3, Vector3};
+use crate::prelude::*;
+use control::sliding::{SecondOrderForm, Settings};
 use proptest::prelude::*;
 
 /// Gains of one axis with the matrices of (50).

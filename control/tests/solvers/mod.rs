@@ -4,6 +4,7 @@
 mod takeover;
 
 use crate::harness::norm_constraints::Sets;
+use crate::prelude::*;
 use control::mpc::certificate::Certificate;
 use control::mpc::conic::ConicSolver;
 use control::mpc::constraints::LinearisedConstraints;
@@ -11,11 +12,9 @@ use control::mpc::lq::Unconstrained;
 use control::mpc::problem::{End, Outcome, Problem, Solution, Start};
 use control::mpc::riccati::Riccati;
 use control::mpc::{Budget, Chain, Cost, Layout, State};
-use nalgebra::{SMatrix, Vector3};
+use nalgebra::SMatrix;
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
-use std::cell::Cell;
-use vehicle::scenario::Scenario;
 
 const MAX_ITERATIONS: u32 = 60;
 

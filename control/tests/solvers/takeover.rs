@@ -2,15 +2,11 @@
 
 use super::{MAX_ITERATIONS, MODERATE, Shape, published};
 use crate::harness::norm_constraints::Sets;
+use crate::prelude::*;
 use control::mpc::{
-    Bounded, Bounds, Chain, Constraints, ErrorTrajectory, Layout, Optimiser, SolverSettings,
-    StageConstraints, State,
+    Bounded, Bounds, Chain, Constraints, ErrorTrajectory, Layout, Optimiser, StageConstraints,
+    State,
 };
-use control::report::SolverStatus;
-use nalgebra::Vector3;
-use std::cell::Cell;
-use std::ops::Range;
-use vehicle::scenario::Scenario;
 
 /// Sets that the Riccati method cannot evaluate: after the first computation of bounds their values
 /// are not numbers.
@@ -84,37 +80,28 @@ fn the_cone_solver_takes_over_where_the_riccati_method_fails() {
     let affine = vec![[Vector3::zeros(); 2]; horizon];
     let body = Scenario::crmpc2022().inertia.body(1.0).unwrap();
     let previous = ErrorTrajectory::new(horizon);
-    // The spoilt sets are valid again when the cone solver asks.
-    for (computed, status) in [(0, SolverStatus::Cone), (1, SolverStatus::Constrained)] {
+    let report = |computed: usize, time_budget: f64| {
         let solver = SolverSettings {
             shortcuts: false,
+            time_budget,
             max_iterations: MAX_ITERATIONS,
             ..SolverSettings::default()
         };
         let mut optimiser = Optimiser::new(layout.clone(), solver).unwrap();
         let sets = Sets { body, printed: false, bounds: (0.0873, 1.356e5) };
         let spoilt = Spoilt { sets, computed: Cell::new(computed) };
-        let report = optimiser.optimise(
-            &spoilt,
-            &MODERATE.start,
-            &affine,
-            Some((&previous, &[[0.0; 2]; 100])),
-        );
+        let before = Some((&previous, &[[0.0; 2]; 100][..]));
+        optimiser.begin();
+        optimiser.optimise(&spoilt, &MODERATE.start, &affine, before)
+    };
+    // The spoilt sets are valid again when the cone solver asks.
+    let unlimited = SolverSettings::default().time_budget;
+    for (computed, status) in [(0, SolverStatus::Cone), (1, SolverStatus::Constrained)] {
+        let report = report(computed, unlimited);
         assert_eq!(report.status, status);
         assert!(report.certificate.feasibility < 0.1, "{report:?}");
     }
     // With no time left, neither solver is started.
-    let solver = SolverSettings {
-        shortcuts: false,
-        time_budget: 1e-9,
-        max_iterations: MAX_ITERATIONS,
-        ..SolverSettings::default()
-    };
-    let mut optimiser = Optimiser::new(layout, solver).unwrap();
-    let sets = Sets { body, printed: false, bounds: (0.0873, 1.356e5) };
-    let sets = Spoilt { sets, computed: Cell::new(1) };
-    optimiser.begin();
-    let report =
-        optimiser.optimise(&sets, &MODERATE.start, &affine, Some((&previous, &[[0.0; 2]; 100])));
+    let report = report(1, 1e-9);
     assert_eq!((report.status, report.iterations), (SolverStatus::Fallback, 0));
 }

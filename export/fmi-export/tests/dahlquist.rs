@@ -6,9 +6,8 @@
 mod dahlquist;
 
 use dahlquist::Dahlquist;
+use fmi_export::Export;
 use fmi_export::linked::Linked;
-use fmi_export::{Export, describe};
-use model_description::variable::VariableKind;
 
 /// Value references of k, x and der(x).
 const K: u32 = 0;
@@ -31,18 +30,4 @@ fn oracle_the_state_decays_as_the_exponential_function() {
     let bound = 1.1 * 100.0 * 0.02_f64.powi(5) / 120.0;
     assert!((values[0] - exact).abs() < bound * exact, "{} {exact}", values[0]);
     assert_eq!(values[1], -2.0 * values[0]);
-}
-
-#[test]
-fn names_starts_units_and_the_derivative_are_described() {
-    let description = describe::<Dahlquist>();
-    description.check().unwrap();
-    assert!(description.model_exchange);
-    assert_eq!(description.states(), [(X as usize, DERIVATIVE as usize)]);
-    let names = description.variables.iter().map(|variable| variable.name.as_str());
-    assert!(names.eq(["k", "x", "der(x)"]));
-    let VariableKind::Real { unit: Some(unit), start, .. } = &description.variables[0].kind else {
-        panic!("k is a Real with a unit");
-    };
-    assert_eq!((unit.name.as_str(), *start), ("1/s", Some(1.0)));
 }

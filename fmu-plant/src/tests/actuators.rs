@@ -1,14 +1,8 @@
 //! Surfaces and jets, and the events at which surfaces come to rest.
 
 use super::model_exchange::{exchange, indicators, integrate, states};
+use super::prelude::*;
 use super::{actuate, outputs, started, step};
-use crate::parameters::Actuation;
-use crate::plant::INDICATORS;
-use crate::plant::{Output, ReentryPlant};
-use fmi_export::Model;
-use nalgebra::Vector3;
-use vehicle::disturbance::DisturbanceKind;
-use vehicle::effectors::Surfaces;
 
 /// Commands beyond the limits, at the limits and within them.
 const FAR: [f64; 8] = [-90.0, 4.0, -3.0, 0.0, 90.0, 0.0, 0.0, 0.0];

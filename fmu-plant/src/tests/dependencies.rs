@@ -1,18 +1,14 @@
 //! Dependencies of the outputs on states and inputs against those that are declared.
 
 use super::entry::{entering, in_general_motion, prescribed};
+use super::prelude::*;
 use super::{
     CONTEXT, STATE_COUNT, STATES, actuate, all_kinds, delayed, in_model_exchange, outputs, started,
     step,
 };
-use crate::plant::ReentryPlant;
-use fmi_export::{Model, describe};
-use model_description::variable::{Causality, Variable, VariableKind};
-use nalgebra::Vector3;
+use model_description::variable::Variable;
 use settings::{Field, Settings};
 use std::sync::LazyLock;
-use vehicle::disturbance::DisturbanceKind;
-use vehicle::kinematics::Kinematics;
 use vehicle::trajectory::Trajectory;
 
 fn is_real(variable: &Variable) -> bool {

@@ -2,14 +2,10 @@
 //! outputs of a fixed flight condition.
 
 use super::model_exchange::flown;
+use super::prelude::*;
 use super::{STATES, outputs, started, step};
 use crate::entry::Translation;
-use crate::plant::{Output, ReentryPlant};
-use fmi_export::{Failure, LastEvent, Model};
-use nalgebra::Vector3;
 use vehicle::air::Row;
-use vehicle::disturbance::DisturbanceKind;
-use vehicle::effectors::Surfaces;
 use vehicle::entry::Trim;
 
 /// An entry flight without disturbance at 45 km, through wind, with surfaces and jets.

@@ -2,21 +2,19 @@
 
 mod actuators;
 mod dependencies;
-mod description;
 mod entry;
 mod model_exchange;
 mod outputs;
 mod own_vehicle;
+mod prelude;
 mod refusals;
 mod sensors;
 
-use crate::parameters::{Actuation, Parameters};
-use crate::plant::{Output, ReentryPlant};
-use fmi_export::{Context, Failure, Inputs, LastEvent, Model};
-use nalgebra::Vector3;
+use fmi_export::{Context, Inputs};
+use prelude::*;
 use settings::Choice;
-use vehicle::disturbance::{DisturbanceKind, Row};
-use vehicle::effectors::{Jets, Surfaces};
+use vehicle::disturbance::Row;
+use vehicle::effectors::Jets;
 
 const CONTEXT: Context = Context { start_time: 0.0, stop_time: None, resources: None };
 
@@ -27,21 +25,6 @@ impl Inputs<ReentryPlant> for Constant {
     fn advance(&self, _: &mut ReentryPlant, _: f64) {}
     fn are_extrapolated(&self) -> bool {
         false
-    }
-    fn integrate(&self, _: &mut ReentryPlant, _: f64, _: f64) -> Result<(), Failure> {
-        unreachable!("the plant integrates its states itself")
-    }
-}
-
-/// Pitch moment that rises with time.
-struct Ramp(f64);
-
-impl Inputs<ReentryPlant> for Ramp {
-    fn advance(&self, model: &mut ReentryPlant, time: f64) {
-        model.input.moment.y = self.0 * time;
-    }
-    fn are_extrapolated(&self) -> bool {
-        true
     }
     fn integrate(&self, _: &mut ReentryPlant, _: f64, _: f64) -> Result<(), Failure> {
         unreachable!("the plant integrates its states itself")

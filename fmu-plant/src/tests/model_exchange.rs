@@ -1,10 +1,8 @@
 //! Model exchange against co-simulation, with the disturbance's events.
 
+use super::prelude::*;
 use super::{CONTEXT, STATE_COUNT, actuate, all_kinds, outputs, started, step, tabulate};
-use crate::plant::{INDICATORS, Output, ReentryPlant};
-use fmi_export::{LastEvent, Model};
-use nalgebra::Vector3;
-use vehicle::disturbance::{DisturbanceKind, Row};
+use vehicle::disturbance::Row;
 
 type States = nalgebra::SVector<f64, STATE_COUNT>;
 
@@ -166,11 +164,7 @@ fn oracle_model_exchange_agrees_with_co_simulation_under_surfaces_and_jets() {
             exchange(&mut me, begin, end);
             let [cs, me] = [&mut cs, &mut me].map(|instance| outputs(instance, end));
             assert_same_motion(&cs, &me, &format!("kind {kind:?}, duty {duty}, tick {k}"));
-            assert!(
-                (cs.deflections - me.deflections).amax() < 1e-13,
-                "{}",
-                cs.deflections - me.deflections
-            );
+            assert!((cs.deflections - me.deflections).amax() < 1e-13, "{}", cs.deflections);
             assert!((cs.applied_moment - me.applied_moment).amax() < 1e-7);
         }
     }

@@ -2,11 +2,10 @@
 
 use super::entry::entering;
 use super::model_exchange::flown;
+use super::prelude::*;
 use super::{CONTEXT, actuate, outputs, started, step};
-use crate::plant::ReentryPlant;
-use fmi_export::{Model, Restoration};
+use fmi_export::Restoration;
 use std::path::PathBuf;
-use vehicle::disturbance::DisturbanceKind;
 
 /// The papers' vehicle as one file: air, surfaces and jets.
 const PAPERS: &str = concat!(

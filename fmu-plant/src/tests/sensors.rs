@@ -1,12 +1,9 @@
 //! Tests of the sensors through the instance's interface.
 
 use super::model_exchange::{assert_same_motion, exchange, integrate};
+use super::prelude::*;
 use super::{outputs, started, step};
-use crate::plant::ReentryPlant;
-use fmi_export::Model;
-use nalgebra::Vector3;
-use vehicle::disturbance::DisturbanceKind;
-use vehicle::kinematics::{Kinematics, r_inverse};
+use vehicle::kinematics::r_inverse;
 use vehicle::sensors::Sample;
 use vehicle::triad::Window;
 

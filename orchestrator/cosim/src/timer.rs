@@ -59,20 +59,3 @@ pub(crate) mod fake {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn no_one_is_woken_before_the_instant() {
-        let timer = Monotonic;
-        for microseconds in [0, 1, 100, 3000] {
-            let instant = timer.now() + Duration::from_micros(microseconds);
-            timer.sleep_until(instant);
-            assert!(timer.now() >= instant);
-        }
-        // An instant in the past is accepted.
-        timer.sleep_until(Duration::ZERO);
-    }
-}

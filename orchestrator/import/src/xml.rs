@@ -261,17 +261,10 @@ mod tests {
     fn text_of_every_declared_encoding_is_read() {
         let decoded =
             |declaration: &str, rest: &[u8]| decode(&[declaration.as_bytes(), rest].concat());
-        assert_eq!(
-            decoded("<?xml version='1.0' encoding='ISO-8859-1'?>", b"\xfc").unwrap().chars().last(),
-            Some('ü')
-        );
-        assert_eq!(
-            decoded("<?xml version=\"1.0\" encoding = \"utf-8\"?>", "ü".as_bytes())
-                .unwrap()
-                .chars()
-                .last(),
-            Some('ü')
-        );
+        let latin = "<?xml version='1.0' encoding='ISO-8859-1'?>";
+        assert!(decoded(latin, b"\xfc").unwrap().ends_with('ü'));
+        let utf8 = "<?xml version=\"1.0\" encoding = \"utf-8\"?>";
+        assert!(decoded(utf8, "ü".as_bytes()).unwrap().ends_with('ü'));
         assert_eq!(decoded("\u{feff}<a/>", b"").unwrap(), "<a/>");
         let wide: Vec<u8> =
             "\u{feff}<a b='ü'/>".encode_utf16().flat_map(u16::to_le_bytes).collect();

@@ -208,21 +208,11 @@ mod tests {
                 offset,
                 displays: displays.iter().map(|(n, f, o)| ((*n).to_string(), *f, *o)).collect(),
             };
+        let in_degrees = 180.0 / std::f64::consts::PI;
+        let (angle, angle_rate) = ([0, 0, 0, 0, 0, 0, 0, 1], [0, 0, -1, 0, 0, 0, 0, 1]);
         vec![
-            unit(
-                "rad",
-                [0, 0, 0, 0, 0, 0, 0, 1],
-                1.0,
-                0.0,
-                &[("deg", 180.0 / std::f64::consts::PI, 0.0)],
-            ),
-            unit(
-                "rad/s",
-                [0, 0, -1, 0, 0, 0, 0, 1],
-                1.0,
-                0.0,
-                &[("deg/s", 180.0 / std::f64::consts::PI, 0.0)],
-            ),
+            unit("rad", angle, 1.0, 0.0, &[("deg", in_degrees, 0.0)]),
+            unit("rad/s", angle_rate, 1.0, 0.0, &[("deg/s", in_degrees, 0.0)]),
             unit("s", [0, 0, 1, 0, 0, 0, 0, 0], 1.0, 0.0, &[("ms", 1000.0, 0.0)]),
             unit("min", [0, 0, 1, 0, 0, 0, 0, 0], 60.0, 0.0, &[]),
             unit("K", [0, 0, 0, 0, 1, 0, 0, 0], 1.0, 0.0, &[("degC", 1.0, -273.15)]),

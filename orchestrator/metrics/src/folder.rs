@@ -117,30 +117,3 @@ fn open(path: &Path) -> std::io::Result<File> {
 fn open(path: &Path) -> std::io::Result<File> {
     File::options().create(true).truncate(false).write(true).open(path.join(".lock"))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_folder_is_taken_once_and_given_back() {
-        let outer = tempfile::tempdir().unwrap();
-        let path = outer.path().join("out");
-        let refusal = |outcome: Result<(), Error>| outcome.unwrap_err().to_string();
-        let first = Folder::take(&path).unwrap();
-        let second = refusal(Folder::take(&path).map(drop));
-        assert!(second.contains("another process is writing its results to"), "{second}");
-        drop(first);
-        let folder = Folder::take(&path).unwrap();
-        fs::write(path.join("plot.svg"), "").unwrap();
-        fs::write(path.join("notes.txt"), "").unwrap();
-        assert!(
-            refusal(Folder::check(&path, false)).contains("results of an earlier run (plot.svg)")
-        );
-        Folder::check(&path, true).unwrap();
-        folder.clear().unwrap();
-        assert!(!path.join("plot.svg").exists() && path.join("notes.txt").exists());
-        Folder::check(&path, false).unwrap();
-        assert!(refusal(Folder::check(&path.join("notes.txt"), true)).contains("is a file"));
-    }
-}

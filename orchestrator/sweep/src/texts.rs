@@ -27,25 +27,3 @@ pub fn shown(value: f64) -> String {
     // A line is not broken at this sign.
     text.replace('-', "−")
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_shown_as_papers_print_them() {
-        for (value, text) in [
-            (1.6055, "1.6055"),
-            (0.3552, "0.3552"),
-            (116.8, "116.8"),
-            (12_345.6, "12346"),
-            (0.08511, "0.0851"),
-            (0.23413, "0.2341"),
-            (2e-5, "2.000e−5"),
-            (-0.0123, "−0.0123"),
-            (100.0, "100"),
-        ] {
-            assert_eq!(shown(value), text);
-        }
-    }
-}

@@ -1,15 +1,12 @@
 //! A folder to run the program in, with an FMU in C that `cc` compiles there.
 
+use crate::prelude::*;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::{Field, Row};
-use std::fs;
-use std::io::Write;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output};
+use std::path::PathBuf;
+use std::process::{Child, Output};
 use std::sync::LazyLock;
-use std::time::{Duration, Instant};
 use tempfile::TempDir;
-use zip::write::SimpleFileOptions;
 
 /// Experiment in which two instances of the FMU form a loop.
 pub(crate) const LOOP: &str = r#"
@@ -163,10 +160,26 @@ impl Bench {
         said
     }
 
-    /// Calls the program, which must end with this exit code and name this on standard error.
-    pub(crate) fn fails(&self, exit_code: i32, arguments: &[&str], named: &str) {
+    /// Calls the program, which must end with this exit code and name this on standard error, whose
+    /// text is returned.
+    #[track_caller]
+    pub(crate) fn fails(&self, exit_code: i32, arguments: &[&str], named: &str) -> String {
         let (code, _, errors) = self.call(arguments);
         assert!(code == exit_code && errors.contains(named), "{arguments:?}: {code} {errors}");
+        errors
+    }
+
+    /// Runs the experiment, with an exit code and words on standard error as [`Bench::fails`].
+    #[track_caller]
+    pub(crate) fn ends(&self, exit_code: i32, arguments: &[&str], named: &str) -> String {
+        self.fails(exit_code, &[&["run", "loop.toml", "--force"], arguments].concat(), named)
+    }
+
+    /// Runs the experiment, which must succeed without a word on standard error.
+    #[track_caller]
+    pub(crate) fn silent(&self, arguments: &[&str]) {
+        let (code, _, errors) = self.run(arguments);
+        assert_eq!((code, errors.as_str()), (0, ""), "{arguments:?}");
     }
 
     /// Runs the experiment, replaces results of an earlier run, and returns the summary.
@@ -248,4 +261,15 @@ impl Random {
         let magnitude = 10.0_f64.powf(self.between(low, high));
         if self.below(2) == 0 { -magnitude } else { magnitude }
     }
+}
+
+/// Asserts that a text holds this part.
+#[track_caller]
+pub(crate) fn assert_has(text: &str, part: &str) {
+    assert!(text.contains(part), "no {part:?} in {text}");
+}
+
+/// Returns a text without its quotation marks.
+pub(crate) fn plain(text: &str) -> String {
+    text.replace('"', "")
 }

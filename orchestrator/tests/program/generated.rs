@@ -1,32 +1,26 @@
 //! Generated units for model exchange, whose events are those of their exact solutions.
 
-use crate::bench::{Bench, Random, Recipe};
+use crate::bench::Random;
+use crate::prelude::*;
 use std::f64::consts::PI;
 use std::fmt::Write as _;
-use std::fs;
 
 /// Length of a run, s.
 const SPAN: f64 = 2.0;
 /// Number of event times that a unit keeps.
 const KEPT: usize = 6;
-const PARAMETERS: [&str; 10] = [
-    "family",
-    "action",
-    "announcement",
-    "begin",
-    "speed",
-    "rate",
-    "aim",
-    "threshold",
-    "sign",
-    "period",
-];
+const PARAMETERS: &str = "family action announcement begin speed rate aim threshold sign period";
 
 /// A unit with the times since the start at which its events must come, each with the error (s)
 /// that the rounding of its states may make.
 struct Unit {
-    values: [f64; 10],
+    values: [f64; Unit::VALUES],
     events: Vec<(f64, f64)>,
+}
+
+impl Unit {
+    /// Number of its parameters.
+    const VALUES: usize = 10;
 }
 
 /// What a unit is made of: family, action, announcement, start, speed, rate, aim.
@@ -54,24 +48,12 @@ impl Frame {
 
     /// Makes a unit whose indicator has at least this slope at its events.
     fn unit(&self, made: Made, times: impl IntoIterator<Item = f64>, slope: f64) -> Unit {
-        let [family, action, announcement, begin, speed, rate, aim] = made;
         let Self { sign, threshold, period, .. } = *self;
-        let error = 2.0 * f64::EPSILON * threshold.abs().max(begin.abs()) / slope;
-        Unit {
-            values: [
-                family,
-                action,
-                announcement,
-                begin,
-                speed,
-                rate,
-                aim,
-                threshold,
-                sign,
-                period,
-            ],
-            events: times.into_iter().map(|time| (time, error)).collect(),
-        }
+        let mut values = [0.0; Unit::VALUES];
+        values[..7].copy_from_slice(&made);
+        values[7..].copy_from_slice(&[threshold, sign, period]);
+        let error = 2.0 * f64::EPSILON * threshold.abs().max(made[3].abs()) / slope;
+        Unit { values, events: times.into_iter().map(|time| (time, error)).collect() }
     }
 }
 
@@ -184,14 +166,14 @@ fn description(states: usize) -> String {
         add(format!("d{state}"), 40 + state, "variability=\"continuous\"", derivative);
         let _ = write!(structure[1], "<Unknown index=\"{}\"/>", index + 1);
     }
-    for (place, name) in PARAMETERS.iter().enumerate() {
+    for (place, name) in PARAMETERS.split(' ').enumerate() {
         let kind = "causality=\"parameter\" variability=\"fixed\"";
-        add((*name).to_string(), place, kind, " start=\"0\"".into());
+        add(name.to_string(), place, kind, " start=\"0\"".into());
     }
     for place in 0..=KEPT {
         let kind = "causality=\"output\" variability=\"discrete\"";
         add(format!("t{place}"), 20 + place, kind, String::new());
-        let index = 2 * states + PARAMETERS.len() + place + 1;
+        let index = 2 * states + Unit::VALUES + place + 1;
         let _ = write!(structure[0], "<Unknown index=\"{index}\"/>");
     }
     let [outputs, derivatives] = structure;
@@ -212,7 +194,7 @@ fn experiment(units: &[Unit], start: f64, step: f64) -> String {
             text,
             "[components.{name}]\nfmu = \"Model.fmu\"\ntolerance = 1e-13\n[components.{name}.parameters]"
         );
-        for (name, value) in PARAMETERS.iter().zip(unit.values) {
+        for (name, value) in PARAMETERS.split(' ').zip(unit.values) {
             let _ = writeln!(text, "{name} = {value:?}");
         }
     }

@@ -1,11 +1,7 @@
 //! Instances that try to reach resources of others: tests/model/hostile.h.
 
-use crate::bench::{Bench, LOOP, Recipe, await_until, with_usual_signals};
-use crate::campaign::CAMPAIGN;
-use std::fs;
+use crate::prelude::*;
 use std::os::unix::fs::MetadataExt;
-use std::path::Path;
-use std::process::Command;
 
 /// A bench with a model that makes attempts on a folder outside.
 struct Hostile {
@@ -103,25 +99,10 @@ fn a_closed_process_reaches_nothing_but_its_own_folders() {
 #[test]
 fn the_attempts_get_through_in_an_open_process() {
     let hostile = Hostile::new();
-    let harmless = [
-        "write_file",
-        "append_file",
-        "read_file",
-        "environment",
-        "own_environment",
-        "connections",
-        "mounts",
-        "users_folder",
-        "parent_environment",
-        "signal_parent",
-        "signal_by_pipe",
-        "limit_parent",
-        "local_socket",
-        "memory_file",
-        "shared_memory",
-        "new_process",
-        "change_mode",
-    ];
+    let harmless = "write_file append_file read_file environment own_environment connections mounts \
+                    users_folder parent_environment signal_parent signal_by_pipe limit_parent \
+                    local_socket memory_file shared_memory new_process change_mode";
+    let harmless: Vec<&str> = harmless.split(' ').collect();
     let mut through = Vec::new();
     for number in 1.. {
         let name = |errors: &str| {
@@ -167,23 +148,6 @@ fn whatever_loads_a_library_can_do_so_in_a_closed_process_and_cleans_up_after_it
         assert!(output.status.success() && !is_told, "{command:?}: {errors}");
         hostile.assert_untouched(&errors);
     }
-}
-
-#[test]
-fn the_option_needs_no_other_one_and_no_trust() {
-    let hostile = Hostile::new();
-    let made_by_us = |text: String| text.replace("generationTool=\"", "generationTool=\"fmu-pack ");
-    let flags = format!("-DOUTSIDE=\"{}\"", hostile.outside.path().display());
-    let recipe = Recipe { flags: &[&flags], description: &made_by_us, ..Recipe::default() };
-    let foreign = Bench::made(LOOP, &recipe);
-    fs::create_dir(foreign.path("temporary")).unwrap();
-    let foreign = Hostile { bench: foreign, ..hostile };
-    let (_, errors) = foreign.attempt(1, &["--isolate"]);
-    assert!(
-        errors.contains("write_file was refused") || errors.contains("cannot close"),
-        "{errors}"
-    );
-    foreign.assert_untouched(&errors);
 }
 
 /// Asserts that no process of a mark is left, or only for a moment.

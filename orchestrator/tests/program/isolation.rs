@@ -1,11 +1,6 @@
 //! Instances that harm the process they are in, which is closed unless an option opens it.
 
-use crate::bench::{Bench, LOOP, PATIENCE, Recipe, await_until, await_while_it_runs};
-use crate::campaign::CAMPAIGN;
-use std::fs;
-use std::path::Path;
-use std::process::Stdio;
-use std::time::Instant;
+use crate::prelude::*;
 
 /// Kinds of harm, with the messages about them.
 const HARM: [(&str, &str); 8] = [
@@ -271,21 +266,6 @@ fn an_fmu_that_may_be_in_a_process_only_once_is_used_once() {
     let experiment = LOOP.replacen("Model.fmu", "Copy.fmu", 1);
     fs::write(bench.path("loop.toml"), experiment).unwrap();
     assert_eq!(run(&bench, &[]).0, 0);
-}
-
-#[test]
-fn a_closed_process_keeps_an_instance_from_files_and_network() {
-    let outside = Path::new(env!("CARGO_TARGET_TMPDIR")).join("written-by-an-instance");
-    let _ = fs::remove_file(&outside);
-    let flags = format!("-DREACHES=\"{}\"", outside.display());
-    let bench = Bench::made(LOOP, &Recipe { flags: &[&flags], ..Recipe::default() });
-    let (code, errors) = run(&bench, &["--isolate=false"]);
-    assert_eq!(code, 0, "{errors}");
-    assert!(outside.is_file());
-    fs::remove_file(&outside).unwrap();
-    let (code, errors) = run(&bench, &[]);
-    assert!(!outside.exists() && errors.contains("no file, no network"), "{errors}");
-    assert_eq!(code, 0, "{errors}");
 }
 
 #[test]

@@ -1,14 +1,10 @@
 //! Commands that are killed at any time: nothing of them is left behind after the next one, and it
 //! gives the same bytes. The variable `KILLS` sets their number.
 
-use crate::bench::Bench;
-use crate::campaign::CAMPAIGN;
 use crate::hostile::assert_gone;
+use crate::prelude::*;
 use std::collections::BTreeMap;
-use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-use std::time::Instant;
+use std::path::PathBuf;
 
 const STUDY: &str = r##"
 title = "seeds"

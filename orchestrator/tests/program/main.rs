@@ -15,6 +15,7 @@ mod kills;
 mod malformed;
 mod names;
 mod plot;
+mod prelude;
 mod results;
 mod search;
 mod sense;

@@ -1,9 +1,7 @@
 //! Tests of names: the list, the names that each command takes, and its message about a name of
 //! another kind.
 
-use crate::bench::{Bench, LOOP};
-use crate::campaign::CAMPAIGN;
-use std::fs;
+use crate::prelude::*;
 
 /// A folder with an experiment `loop`, a campaign `gains`, a study `papers` and an FMU `Model`.
 fn bench() -> Bench {
@@ -38,8 +36,7 @@ fn a_name_of_another_kind_is_told_what_to_call() {
         ("show", "Model", "Model is an FMU: orchestrator inspect Model"),
     ];
     for (command, name, says) in says {
-        let (code, _, errors) = bench.call(&[command, name]);
-        assert!(code == 2 && errors.contains(says), "{command} {name}: {errors}");
+        let errors = bench.fails(2, &[command, name], says);
         assert_eq!(errors.lines().count(), 1, "{errors}");
     }
     // The message about a name of several kinds lists all of them, and each command takes its own.
@@ -90,8 +87,7 @@ fn every_command_takes_names_of_what_is_installed() {
             "there is no study or experiment or campaign \"gans\", neither as a file",
         ),
     ] {
-        let (code, _, errors) = bench.call(&arguments);
-        assert!(code == 2 && errors.contains(says), "{errors}");
+        let errors = bench.fails(2, &arguments, says);
         assert!(errors.contains("; did you mean \""), "{errors}");
     }
     fs::create_dir_all(bench.path("a/c")).unwrap();
@@ -154,12 +150,15 @@ fn a_bad_value_is_blamed_on_its_option() {
         (&["campaign", "gains", "--jobs", "-1"], "'-1' for '--jobs"),
         (&["campaign", "gains", "--case", "-1"], "'-1' for '--case"),
         (&["campaign", "gains", "--case", "6"], "--case 6: "),
+        (&["list", "missing"], "missing"),
+        (&["campaign", "gains", "--cases", "3..3"], "within 0..6"),
+        (&["campaign", "gains", "--cases", "0..2000"], "within 0..6"),
+        (&["campaign", "gains", "--cases", "0-3"], "expected two whole numbers"),
         (&["campaign", "gains", "--cases", "-5..3"], "'-5..3' for '--cases"),
         (&["reproduce", "papers", "--members", "-1"], "'-1' for '--members"),
         (&["margins", "loop", "--at", "-5", "--open", "plant.input"], "--at -5: "),
     ] {
-        let (code, _, errors) = bench.call(arguments);
-        assert!(code == 2 && errors.contains(blamed), "{arguments:?}: {errors}");
+        let errors = bench.fails(2, arguments, blamed);
         assert!(!errors.contains(".toml"), "{errors}");
     }
     // Values of the file are still its own fault.

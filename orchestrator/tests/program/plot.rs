@@ -1,8 +1,7 @@
 //! Pictures and pages of recorded runs, of a loop that can be computed by hand.
 
-use crate::bench::{Bench, LOOP};
+use crate::prelude::*;
 use serde_json::Value;
-use std::fs;
 
 /// Panels of the loop. Its integrator has the values 2^k at tick k.
 const PANELS: &str = r#"

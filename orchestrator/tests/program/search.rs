@@ -1,7 +1,7 @@
 //! Searches for the worst case of a loop that can be computed by hand.
 
-use crate::campaign::{RANDOM, bench};
-use std::fs;
+use crate::campaign::bench;
+use crate::prelude::*;
 
 #[test]
 fn a_search_finds_the_corner_and_writes_it_as_an_experiment() {

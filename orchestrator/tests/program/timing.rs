@@ -1,12 +1,7 @@
 //! Tests of runs with the wall clock, of runs that are ended early, and of the files that they
 //! leave.
 
-use crate::bench::{Bench, await_while_it_runs, with_usual_signals};
-use std::fs;
-use std::io::Write;
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
-use zip::write::SimpleFileOptions;
+use crate::prelude::*;
 
 #[test]
 fn a_run_in_real_time_takes_its_time() {
@@ -36,17 +31,6 @@ fn every_missed_deadline_is_counted() {
     assert_eq!(rows("out/loop"), rows("usual"));
     let (_, _, errors) = bench.run(&["--real-time", IMPOSSIBLE, "--quiet"]);
     assert!(errors.contains("6 of 6 deadlines missed"), "{errors}");
-}
-
-#[test]
-fn a_slow_component_is_named() {
-    let bench = Bench::new();
-    // There are 20 ms from tick to tick, but a step of the plant takes 50 ms.
-    bench.flown(&["--real-time", "50", "--set", "plant.pause=0.05"]);
-    let real_time = &bench.json("out/loop/metrics.json")["real_time"];
-    // The tick at the start needs no step.
-    assert!(real_time["misses"]["plant"].as_u64().unwrap() >= 3, "{real_time}");
-    assert!(real_time["worst_miss"]["late_ms"].as_f64().unwrap() >= 29.9, "{real_time}");
 }
 
 /// Starts the program, sends it a signal once the file `awaited` exists, and returns its exit code.
@@ -158,25 +142,6 @@ fn an_archive_that_cannot_be_written_leaves_nothing_behind() {
     assert_eq!(errors.lines().count(), 1, "{errors}");
     let there = fs::read_dir(bench.folder.path()).unwrap().flatten().map(|entry| entry.file_name());
     assert!(there.into_iter().all(|name| !name.to_string_lossy().contains("ssp")), "{errors}");
-}
-
-#[cfg(unix)]
-#[test]
-fn two_processes_do_not_share_a_folder() {
-    let bench = Bench::new();
-    let mut child = bench
-        .command(&["run", "loop.toml", "--out", "shared", "--real-time", "2.7e-5"])
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    let results = bench.path("shared/results.csv");
-    await_while_it_runs(&mut child, "results.csv", || results.exists());
-    let message = bench.refusal(&["--out", "shared"]);
-    assert!(message.contains("another process is writing its results to shared"), "{message}");
-    child.kill().unwrap();
-    child.wait().unwrap();
-    assert_eq!(bench.run(&["--out", "shared"]).0, 0);
 }
 
 #[cfg(target_os = "linux")]

@@ -1,9 +1,7 @@
 //! The same command, started twenty times at once.
 
-use crate::bench::Bench;
-use crate::campaign::CAMPAIGN;
-use std::fs;
-use std::process::{Child, Output, Stdio};
+use crate::prelude::*;
+use std::process::{Child, Output};
 
 /// Starts a command twenty times and returns how often it succeeded. Those that did not must have
 /// said that another one is at work, or that there are results.

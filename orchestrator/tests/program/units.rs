@@ -1,11 +1,9 @@
 //! Generated SSP systems, whose values are those of the standard's arithmetic: SSP 2.0, sections 4
 //! (units, transformations) and 5 (connections).
 
-use crate::bench::{Bench, FMI3, Random, Recipe};
+use crate::bench::Random;
+use crate::prelude::*;
 use std::fmt::Write as _;
-use std::fs;
-use std::io::Write as _;
-use zip::write::SimpleFileOptions;
 
 /// Units of two quantities: name, base unit, factor, offset.
 const UNITS: [[(&str, &str, f64, f64); 3]; 2] = [

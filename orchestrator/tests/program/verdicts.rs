@@ -1,9 +1,8 @@
 //! Every verdict that the program prints, or writes on a page, where it is good and where it is
 //! not. The loop's integrator has the values (1 + gain)^k at tick k, up to 3.
 
-use crate::bench::{Bench, LOOP};
-use crate::campaign::{CAMPAIGN, RANDOM, bench};
-use std::fs;
+use crate::campaign::bench;
+use crate::prelude::*;
 
 #[test]
 fn a_run_names_what_is_within_and_what_is_beyond_its_limit() {

@@ -105,6 +105,25 @@ impl Model {
         let (it, fmu) = (i.component, &i.fmu);
         let mut next = self.state;
         let mut is_right = true;
+        /// Gets the values of drawn references.
+        macro_rules! get {
+            ($function:ident, $kind:ident, $empty:expr, $is_valid:expr) => {{
+                let references = bytes.references(fmu, $kind);
+                let (n, mut values) = (references.len(), vec![$empty; references.len()]);
+                let status = c!(i, $function(it, references.as_ptr(), n, values.as_mut_ptr()));
+                is_right = values.iter().all($is_valid);
+                status
+            }};
+        }
+        /// Sets drawn references to drawn values.
+        macro_rules! set {
+            ($function:ident, $kind:ident, $draw:ident, $is_valid:expr) => {{
+                let references = bytes.references(fmu, $kind);
+                let values: Vec<_> = references.iter().map(|_| bytes.$draw()).collect();
+                is_right = self.are_settable(&references) && values.iter().all($is_valid);
+                c!(i, $function(it, references.as_ptr(), values.len(), values.as_ptr()))
+            }};
+        }
         let status = match name {
             "fmi2SetupExperiment" => {
                 let (with_stop, start, stop) = (bytes.is(4), bytes.real(), bytes.real());
@@ -126,52 +145,16 @@ impl Model {
                 self.time = 0.0;
                 call(i, null_mut())
             }
-            "fmi2GetReal" => {
-                let references = bytes.references(fmu, is_real);
-                let mut values = vec![f64::NAN; references.len()];
-                let n = references.len();
-                let status = c!(i, fmi2GetReal(it, references.as_ptr(), n, values.as_mut_ptr()));
-                is_right = values.iter().all(|value| value.is_finite());
-                status
-            }
-            "fmi2GetInteger" => {
-                let references = bytes.references(fmu, is_whole);
-                let (n, mut values) = (references.len(), vec![0; references.len()]);
-                c!(i, fmi2GetInteger(it, references.as_ptr(), n, values.as_mut_ptr()))
-            }
-            "fmi2GetBoolean" => {
-                let references = bytes.references(fmu, is_boolean);
-                let (n, mut values) = (references.len(), vec![0; references.len()]);
-                let status = c!(i, fmi2GetBoolean(it, references.as_ptr(), n, values.as_mut_ptr()));
-                is_right = values.iter().all(|value| [0, 1].contains(value));
-                status
-            }
+            "fmi2GetReal" => get!(fmi2GetReal, is_real, f64::NAN, |value: &f64| value.is_finite()),
+            "fmi2GetInteger" => get!(fmi2GetInteger, is_whole, 0, |_: &c_int| true),
+            "fmi2GetBoolean" => get!(fmi2GetBoolean, is_boolean, 0, |value| [0, 1].contains(value)),
             "fmi2GetString" => {
-                let references = bytes.references(fmu, is_string);
-                let (n, mut values) = (references.len(), vec![null(); references.len()]);
-                let status = c!(i, fmi2GetString(it, references.as_ptr(), n, values.as_mut_ptr()));
-                is_right = values.iter().all(|value| !value.is_null());
-                status
+                get!(fmi2GetString, is_string, null(), |value: &*const _| !value.is_null())
             }
-            "fmi2SetReal" => {
-                let references = bytes.references(fmu, is_real);
-                let values: Vec<_> = references.iter().map(|_| bytes.real()).collect();
-                is_right =
-                    self.are_settable(&references) && values.iter().all(|value| value.is_finite());
-                c!(i, fmi2SetReal(it, references.as_ptr(), values.len(), values.as_ptr()))
-            }
-            "fmi2SetInteger" => {
-                let references = bytes.references(fmu, is_whole);
-                let values: Vec<_> = references.iter().map(|_| bytes.whole()).collect();
-                is_right = self.are_settable(&references);
-                c!(i, fmi2SetInteger(it, references.as_ptr(), values.len(), values.as_ptr()))
-            }
+            "fmi2SetReal" => set!(fmi2SetReal, is_real, real, |value: &f64| value.is_finite()),
+            "fmi2SetInteger" => set!(fmi2SetInteger, is_whole, whole, |_: &c_int| true),
             "fmi2SetBoolean" => {
-                let references = bytes.references(fmu, is_boolean);
-                let values: Vec<_> = references.iter().map(|_| bytes.whole()).collect();
-                is_right = self.are_settable(&references)
-                    && values.iter().all(|value| [0, 1].contains(value));
-                c!(i, fmi2SetBoolean(it, references.as_ptr(), values.len(), values.as_ptr()))
+                set!(fmi2SetBoolean, is_boolean, whole, |value| [0, 1].contains(value))
             }
             "fmi2SetString" => {
                 let references = bytes.references(fmu, is_string);

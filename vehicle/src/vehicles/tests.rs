@@ -94,14 +94,6 @@ fn shipped_vehicles_have_the_inertia_of_their_papers() {
     assert_eq!(Vehicle::shipped("chai"), None);
 }
 
-#[test]
-fn a_file_that_is_missing_or_no_text_is_refused() {
-    let read = |path: &str| Vehicle::read(Path::new(path)).unwrap_err().to_string();
-    assert!(read("no-such.toml").starts_with("no-such.toml: "));
-    assert!(read("/dev/zero").contains("is not a file"));
-    assert!(read(env!("CARGO_MANIFEST_DIR")).starts_with(env!("CARGO_MANIFEST_DIR")));
-}
-
 /// C_m of the table at 15° and Mach 5, and the lever arm of the forces: halfway over the angle and
 /// 3/8 of the way over the Mach number.
 #[test]

@@ -1,11 +1,8 @@
 //! Communication points, which change nothing, and saved states.
 
 use super::{config, kinds, moment, on_a_turntable};
-use nalgebra::Vector3;
+use crate::prelude::*;
 use proptest::prelude::*;
-use vehicle::actuators::Command;
-use vehicle::disturbance::DisturbanceKind;
-use vehicle::plant::{Config, Input, Plant, State};
 use vehicle::turntable;
 
 fn long_and_short_steps(config: &Config) -> impl Iterator<Item = (State, State)> {
@@ -49,32 +46,6 @@ fn a_clock_that_is_accumulated_makes_no_slivers() {
             return;
         }
         assert!((exact.state - accumulated.state).amax() < 1e-11, "step {k}");
-    }
-}
-
-#[test]
-fn a_last_step_short_by_rounding_is_taken() {
-    let mut plant = Plant::new(&config(), 0.0).unwrap();
-    plant.advance(0.0, 0.04 - 1e-17, Vector3::zeros()).unwrap();
-    let before = plant.clone();
-    plant.advance(0.04, 0.04, Vector3::repeat(1e5)).unwrap();
-    assert_eq!(plant, before);
-    plant.advance(0.04, 0.04 + 1e-12, Vector3::repeat(1e5)).unwrap();
-    assert!((plant.state - before.state).amax() < 1e-12);
-}
-
-#[test]
-fn start_time_may_be_anything() {
-    for start in [-7.3, 0.0, 100.1] {
-        let mut config = config();
-        config.disturbance.start = start;
-        let mut plant = Plant::new(&config, start).unwrap();
-        plant.advance(start, start + 2.0, Vector3::zeros()).unwrap();
-        let mut origin = config.clone();
-        origin.disturbance.start = 0.0;
-        let mut reference = Plant::new(&origin, 0.0).unwrap();
-        reference.advance(0.0, 2.0, Vector3::zeros()).unwrap();
-        assert!((plant.state - reference.state).amax() < 1e-12, "start {start}");
     }
 }
 

@@ -1,9 +1,8 @@
 //! The disturbance over time: square waves, tables, and values held from tick to tick.
 
 use super::{config, moment, undisturbed};
-use nalgebra::{Vector3, Vector6};
-use vehicle::disturbance::{Disturbance, DisturbanceKind, DisturbanceTable, Row};
-use vehicle::plant::{Config, Plant};
+use crate::prelude::*;
+use vehicle::disturbance::Row;
 
 /// Returns a plant under this disturbance with the bound of crmpc-2022.
 fn disturbed(disturbance: Disturbance) -> Plant {

@@ -6,16 +6,12 @@ mod disturbance;
 mod motion;
 mod refusals;
 
-use nalgebra::Vector3;
-use vehicle::actuators::{self, Command, JetMode};
-use vehicle::disturbance::{
-    Disturbance, DisturbanceKind, DisturbanceTable, MomentWave, Row, SineMoment,
-};
+use crate::prelude::*;
+use vehicle::actuators::{self, JetMode};
+use vehicle::disturbance::{MomentWave, Row, SineMoment};
 use vehicle::effectors::{EffectorFault, Effectors};
 use vehicle::fixes::Devices;
-use vehicle::plant::{Config, State};
-use vehicle::sensor_data::SensorData;
-use vehicle::{Scenario, sensors, turntable};
+use vehicle::{sensors, turntable};
 
 fn config() -> Config {
     Scenario::crmpc2022().config(0.01)

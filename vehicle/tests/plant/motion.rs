@@ -1,11 +1,8 @@
 //! Equations of motion: conservation laws, order, closed forms, and the trajectory's turning.
 
 use super::{TUMBLING, config, moment, undisturbed};
-use nalgebra::{Vector3, Vector6};
-use vehicle::actuators::Command;
-use vehicle::kinematics::Kinematics;
-use vehicle::plant::{Config, Input, Load, Plant, State, derivative};
-use vehicle::trajectory::Trajectory;
+use crate::prelude::*;
+use vehicle::plant::{Load, derivative};
 
 #[test]
 fn oracle_torque_free_motion_conserves_energy_and_angular_momentum() {
@@ -82,17 +79,9 @@ fn oracle_a_steady_climb_over_a_still_earth_shows_in_alpha_alone() {
     let mut plant =
         Plant::new(&undisturbed(State::new(0.3, 0.0, 0.0, 0.0, 0.0, 0.0), 0.01), 0.0).unwrap();
     let climb = Trajectory { flight_path_angle_rate: 0.02, ..Trajectory::default() };
-    plant
-        .advance_with(0.0, 5.0, &Command::default(), |_| Input {
-            trajectory: climb,
-            ..Input::default()
-        })
-        .unwrap();
-    assert!(
-        (plant.state - State::new(0.2, 0.0, 0.0, 0.0, 0.0, 0.0)).amax() < 1e-14,
-        "{}",
-        plant.state
-    );
+    let climbing = Input { trajectory: climb, ..Input::default() };
+    plant.advance_with(0.0, 5.0, &Command::default(), |_| climbing).unwrap();
+    assert!((plant.state - State::x() * 0.2).amax() < 1e-14, "{}", plant.state);
 }
 
 #[test]
@@ -107,12 +96,8 @@ fn a_trajectory_at_rest_changes_no_bit() {
     for k in 0..20 {
         let (from, to) = (0.2 * f64::from(k), 0.2 * f64::from(k + 1));
         plain.advance(from, to, moment(k)).unwrap();
-        along
-            .advance_with(from, to, &Command::default(), |_| Input {
-                trajectory: still,
-                ..moment(k).into()
-            })
-            .unwrap();
+        let input = Input { trajectory: still, ..moment(k).into() };
+        along.advance_with(from, to, &Command::default(), |_| input).unwrap();
     }
     assert_eq!(plain, along);
 }

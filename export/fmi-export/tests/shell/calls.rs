@@ -1,8 +1,7 @@
 //! Test of the calls that are allowed in state stepFailed, which no FMU of the project reaches.
 //! Those of the other states are tested with every FMU: tests/conformance.
 
-use crate::support::{CO_SIMULATION, Instance, LABEL, U, X, c};
-use fmi_export::types::FmiStatus;
+use crate::support::{CO_SIMULATION, FmiStatus, Instance, LABEL, U, X, c};
 use std::ffi::c_void;
 use std::ptr::{null, null_mut};
 

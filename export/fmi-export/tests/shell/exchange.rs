@@ -1,7 +1,6 @@
 //! Tests of model exchange: states, derivatives, events and directional derivatives.
 
 use crate::support::*;
-use fmi_export::types::FmiStatus;
 
 fn state(instance: &Instance) -> f64 {
     let mut x = f64::NAN;

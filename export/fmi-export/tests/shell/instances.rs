@@ -1,7 +1,6 @@
 //! Tests of instantiation, of several instances and FMUs side by side, and of panics.
 
 use crate::support::*;
-use fmi_export::types::{Callbacks, FmiStatus, LogCallback};
 use std::ffi::{CStr, c_char, c_void};
 use std::ptr::{null, null_mut};
 use std::sync::Mutex;
@@ -77,7 +76,7 @@ fn call_all(component: *mut c_void) -> Vec<FmiStatus> {
 }
 
 #[allow(unsafe_code)]
-extern "C" fn calls_back(
+extern "C-unwind" fn calls_back(
     environment: *mut c_void,
     _: *const c_char,
     _: FmiStatus,
@@ -96,20 +95,9 @@ extern "C" fn calls_back(
 }
 
 #[test]
-#[allow(unsafe_code)]
 fn calls_during_a_call_are_refused_whoever_makes_them() {
-    type Fixed = extern "C" fn(*mut c_void, *const c_char, FmiStatus, *const c_char, *const c_char);
     let caller = Caller::default();
-    // SAFETY: the two types differ only in the variadic part, and on the supported platforms a
-    // variadic call without variadic arguments passes the fixed ones like any other call.
-    let logger = unsafe { std::mem::transmute::<Fixed, LogCallback>(calls_back) };
-    let callbacks = Callbacks {
-        logger: Some(logger),
-        allocate_memory: None,
-        free_memory: None,
-        step_finished: None,
-        component_environment: (&raw const caller).cast_mut().cast(),
-    };
+    let callbacks = callbacks(calls_back, &raw const caller);
     let guid = guid("Lag");
     let component =
         c!(fmi2Instantiate(c"it".as_ptr(), CO_SIMULATION, guid.as_ptr(), null(), &callbacks, 0, 0));

@@ -4,7 +4,6 @@ use crate::counter::Counter;
 use crate::lag::Lag;
 use crate::support::*;
 use fmi_export::linked::Linked;
-use fmi_export::types::FmiStatus;
 use fmi_export::{Export, Failure};
 
 fn lag() -> Linked {

@@ -2,7 +2,6 @@
 //! refused.
 
 use crate::support::*;
-use fmi_export::types::FmiStatus;
 
 /// Drives an instance over three steps from `k` on and returns the bits of all its outputs.
 fn run(instance: &Instance, from: i32) -> Vec<u64> {

@@ -1,20 +1,6 @@
 //! Tests of co-simulation: time, input derivatives and status.
 
 use crate::support::*;
-use fmi_export::types::FmiStatus;
-
-#[test]
-fn oracle_the_step_response_is_the_exponential() {
-    let instance = Instance::stepping();
-    assert_eq!(instance.set_real(U, 1.0), FmiStatus::Ok);
-    let h = 0.01;
-    for k in 0..100 {
-        assert_eq!(instance.step(f64::from(k) * h, h), FmiStatus::Ok);
-    }
-    // The solution is x(t) = k u + (x₀ − k u) e^(−t/T).
-    let exact = 2.0 + (0.5 - 2.0) * (-1.0f64 / 0.5).exp();
-    assert!((instance.real(X) - exact).abs() < 1e-10);
-}
 
 /// Returns an instance at that time, which it reached in one step.
 fn at(time: f64, stop: Option<f64>) -> Instance {

@@ -2,7 +2,8 @@
 #![allow(unsafe_code)]
 
 use crate::fmi2;
-use fmi_export::types::{CEventInfo, Callbacks, FmiStatus, LogCallback};
+pub(crate) use fmi_export::types::FmiStatus;
+use fmi_export::types::{CEventInfo, Callbacks, LogCallback};
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::ptr::{null, null_mut};
 use std::sync::Mutex;
@@ -11,10 +12,8 @@ pub(crate) const MODEL_EXCHANGE: c_int = 0;
 pub(crate) const CO_SIMULATION: c_int = 1;
 
 /// Value references of the variables of the FMU `Lag`.
-pub(crate) const TIME_CONSTANT: u32 = 0;
 pub(crate) const GAIN: u32 = 1;
 pub(crate) const INITIAL: u32 = 4;
-pub(crate) const ORDER: u32 = 5;
 pub(crate) const LABEL: u32 = 8;
 pub(crate) const U: u32 = 9;
 pub(crate) const X: u32 = 10;
@@ -35,7 +34,16 @@ pub(crate) struct Message {
 
 type Log = Mutex<Vec<Message>>;
 
-extern "C" fn log(
+/// A logger without its variadic arguments: environment, instance, status, category, message.
+pub(crate) type Logger = unsafe extern "C-unwind" fn(
+    *mut c_void,
+    *const c_char,
+    FmiStatus,
+    *const c_char,
+    *const c_char,
+);
+
+extern "C-unwind" fn log_message(
     environment: *mut c_void,
     instance: *const c_char,
     status: FmiStatus,
@@ -52,17 +60,17 @@ extern "C" fn log(
     log.lock().unwrap().push(Message { status, category, text, instance });
 }
 
-pub(crate) fn callbacks(log_to: *const Log) -> Callbacks {
-    type Fixed = extern "C" fn(*mut c_void, *const c_char, FmiStatus, *const c_char, *const c_char);
+/// Returns callbacks of which this logger gets the environment.
+pub(crate) fn callbacks<T>(logger: Logger, environment: *const T) -> Callbacks {
     // SAFETY: the two types differ only in the variadic part, and on the supported platforms a
     // variadic call without variadic arguments passes the fixed ones like any other call.
-    let logger = unsafe { std::mem::transmute::<Fixed, LogCallback>(log) };
+    let logger = unsafe { std::mem::transmute::<Logger, LogCallback>(logger) };
     Callbacks {
         logger: Some(logger),
         allocate_memory: None,
         free_memory: None,
         step_finished: None,
-        component_environment: log_to.cast_mut().cast(),
+        component_environment: environment.cast_mut().cast(),
     }
 }
 
@@ -114,7 +122,7 @@ pub(crate) fn instantiate(
     let pointer = |text: Option<&CStr>| text.map_or(null(), CStr::as_ptr);
     let log: Box<Log> = Box::default();
     // The callbacks live only during the call, as with some importers.
-    let callbacks = Box::new(callbacks(&raw const *log));
+    let callbacks = Box::new(callbacks(log_message, &raw const *log));
     let component = c!(fmi2Instantiate(
         pointer(name),
         fmu_type,

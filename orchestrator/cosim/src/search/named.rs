@@ -238,31 +238,3 @@ fn unknown(name: &Path, kinds: &[Kind]) -> String {
 fn stem(path: &Path) -> Option<String> {
     Some(path.file_name()?.to_string_lossy().into_owned())
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_kind_of_a_file_is_told_by_its_first_keys() {
-        let kind = |text: &str| Kind::of_text(text);
-        let experiment = "title = \"a\"\n[components.x]\nfmu = \"A.fmu\"";
-        assert_eq!(kind(experiment), Some(Kind::Experiment));
-        assert_eq!(kind("title = \"a\"\nextends = \"b.toml\""), Some(Kind::Experiment));
-        assert_eq!(kind("title = \"a\"\nexperiment = \"b\""), Some(Kind::Campaign));
-        assert_eq!(kind("extends = \"b.toml\"\n[[vary]]"), Some(Kind::Campaign));
-        assert_eq!(kind("title = \"a\"\npaper = \"b\""), None);
-        assert_eq!(kind(&experiment.replace("title", "# title")), None);
-        assert_eq!(kind("title = "), None);
-        assert_eq!(kind("[package]\nname = \"a\""), None);
-    }
-
-    #[test]
-    fn names_are_paths_without_their_extension() {
-        let name = |kind: Kind, path: &str| kind.name(Path::new(path));
-        assert_eq!(name(Kind::Experiment, "a/b.toml"), Path::new("a/b"));
-        assert_eq!(name(Kind::Study, "a/study.toml"), Path::new("a"));
-        assert_eq!(Kind::Fmu.file(Path::new("A.b")), Path::new("A.b.fmu"));
-        assert_eq!(Kind::Study.file(Path::new("a/study.toml")), Path::new("a/study.toml"));
-    }
-}

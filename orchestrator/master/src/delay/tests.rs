@@ -41,14 +41,17 @@ fn wire((from, output): (usize, usize), to: usize) -> Wire {
     Wire { from: port(from, output), to: port(to, 0), scaling: Scaling::default() }
 }
 
+fn parts(descriptions: &[ModelDescription]) -> Vec<Part<'_>> {
+    descriptions.iter().map(|description| Part { name: "c", description }).collect()
+}
+
 fn ticks(
     descriptions: &[ModelDescription],
     every: &[u32],
     wires: &[Wire],
     coupling: Coupling,
 ) -> Vec<u64> {
-    let parts: Vec<Part> =
-        descriptions.iter().map(|description| Part { name: "c", description }).collect();
+    let parts = parts(descriptions);
     feedback_loops(&parts, every, wires, coupling).iter().map(|l| l.ticks).collect()
 }
 
@@ -149,8 +152,7 @@ fn the_longest_loop_counts_and_what_is_on_no_loop_does_not() {
     let law = with_duration(description(&[Some(true)]), "delay", "s");
     let (direct, state) = (description(&[Some(true)]), description(&[Some(false)]));
     let descriptions = [law.clone(), direct, state, law];
-    let parts: Vec<Part> =
-        descriptions.iter().map(|description| Part { name: "c", description }).collect();
+    let parts = parts(&descriptions);
     let wires =
         [wire((0, 1), 1), wire((1, 1), 0), wire((0, 1), 2), wire((2, 1), 0), wire((2, 1), 3)];
     let loops = feedback_loops(&parts, &[1; 4], &wires, Coupling::Sequential);
@@ -202,8 +204,7 @@ fn a_parameter_that_is_no_duration_means_something_else() {
 #[test]
 fn what_is_not_declared_counts_as_direct_and_is_named() {
     let descriptions = [description(&[None]), description(&[Some(false)])];
-    let parts: Vec<Part> =
-        descriptions.iter().map(|description| Part { name: "c", description }).collect();
+    let parts = parts(&descriptions);
     let wires = [wire((0, 1), 1), wire((1, 1), 0)];
     let loops = feedback_loops(&parts, &[1, 1], &wires, Coupling::Jacobi);
     let expected =
@@ -216,8 +217,7 @@ fn what_is_not_declared_counts_as_direct_and_is_named() {
 fn algebraic_loops_are_found_through_any_number_of_components() {
     let direct = description(&[Some(true)]);
     let descriptions = [direct.clone(), direct.clone(), direct];
-    let parts: Vec<Part> =
-        descriptions.iter().map(|description| Part { name: "c", description }).collect();
+    let parts = parts(&descriptions);
     let ring = [wire((0, 1), 1), wire((1, 1), 2), wire((2, 1), 0)];
     assert_eq!(algebraic_loop(&parts, &ring).unwrap().len(), 3);
     assert_eq!(algebraic_loop(&parts, &ring[..2]), None);

@@ -100,26 +100,4 @@ mod tests {
             low += 0.0917;
         }
     }
-
-    /// Labels of marks on a linear axis.
-    fn linear_labels<const N: usize>(marks: [f64; N], range: f64) -> [String; N] {
-        labels(&marks, Some(range)).try_into().unwrap()
-    }
-
-    #[test]
-    fn labels_are_as_short_as_they_can_be() {
-        let cases = [(10.0, 50.0), (0.30000000000000004, 0.5), (-0.0, 1.0), (-2.5, 6.0)];
-        let labels = cases.map(|(value, range)| linear_labels([value], range).concat());
-        assert_eq!(labels, ["10", "0.3", "0", "−2.5"]);
-    }
-
-    #[test]
-    fn labels_with_many_letters_have_exponents() {
-        assert_eq!(linear_labels([0.0, 1e7, 1.5e7], 2e7), ["0", "1e7", "1.5e7"]);
-        assert_eq!(linear_labels([-0.0, 2.9999999999999998e300], 4e300), ["0", "3e300"]);
-        assert_eq!(linear_labels([-2e-6, 1e-22, 2e-6], 5e-6), ["−2e−6", "0", "2e−6"]);
-        assert_eq!(linear_labels([130.0, 135.0, 140.0], 16.3), ["130", "135", "140"]);
-        assert_eq!(labels(&[1e-3, 1.0, 100.0], None), ["0.001", "1", "100"]);
-        assert_eq!(labels(&[1e-13, 1.0], None), ["1e−13", "1e0"]);
-    }
 }

@@ -60,26 +60,3 @@ fn pieces(word: &str, room: usize) -> Vec<String> {
     pieces.push(rest.into_iter().collect());
     pieces
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_text_is_broken_between_words_or_else_after_joints() {
-        assert_eq!(wrapped("angle of attack, deg", 30, 2), ["angle of attack, deg"]);
-        assert_eq!(wrapped("angle of attack, deg", 16, 2), ["angle of attack,", "deg"]);
-        assert_eq!(wrapped("plant.attitude.alpha", 16, 2), ["plant.attitude.", "alpha"]);
-        assert_eq!(wrapped("abcdefgh", 5, 2), ["abcde", "fgh"]);
-        assert_eq!(wrapped("", 5, 2), [""; 0]);
-    }
-
-    #[test]
-    fn a_text_that_is_too_long_keeps_its_ends() {
-        assert_eq!(shortened("abcdefgh", 5), "ab…gh");
-        assert_eq!(shortened("abcde", 5), "abcde");
-        let lines = wrapped("norm(plant.rate.p, plant.rate.q, plant.rate.r), deg/s", 20, 2);
-        assert!(lines.len() == 2 && lines.iter().all(|line| letters(line) <= 20), "{lines:?}");
-        assert!(lines.concat().contains('…') && lines[1].ends_with(", deg/s"), "{lines:?}");
-    }
-}

@@ -187,10 +187,4 @@ mod tests {
         assert_eq!(text(-0.0), "0");
         assert_eq!(text(f64::NAN), "null");
     }
-
-    #[test]
-    fn an_item_is_written_as_words() {
-        assert_eq!(words("inForce"), "in force");
-        assert_eq!(words("pending"), "pending");
-    }
 }

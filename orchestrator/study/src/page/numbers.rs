@@ -138,52 +138,6 @@ pub(super) fn all_values(results: &Results) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::definition::Study;
-    use cosim_report::figure::Color;
-    use std::collections::BTreeSet;
-    use std::fs;
-    use std::path::Path;
-
-    /// Returns the names that the figures draw in a colour: those of runs, and of lines through runs.
-    fn names(study: &Study, color: Color) -> BTreeSet<&String> {
-        let panels =
-            study.figures.iter().flat_map(|figure| figure.panels.iter().map(move |p| (figure, p)));
-        let curves = panels.flat_map(|(figure, panel)| {
-            let lines = panel.lines_across();
-            // Signals with names of their own have colours of their own.
-            let is_by_run = panel.signals.is_empty() && lines.is_empty();
-            let runs = study.runs_of(figure, panel).filter(move |_| is_by_run);
-            let runs = runs.map(|run| (run.color, &run.label));
-            runs.chain(lines.iter().map(|line| (line.color, &line.label)))
-        });
-        curves.filter(|(other, _)| *other == color).map(|(_, name)| name).collect()
-    }
-
-    fn study(path: &Path) -> Study {
-        Study::load(path).unwrap()
-    }
-
-    #[test]
-    fn in_the_figures_of_a_shipped_study_a_run_has_one_colour_and_a_colour_one_run() {
-        let experiments = Path::new(env!("CARGO_MANIFEST_DIR")).join("../experiments");
-        let paths = fs::read_dir(experiments).unwrap().map(|entry| entry.unwrap().path());
-        let studies: Vec<_> =
-            paths.map(|folder| folder.join("study.toml")).filter(|p| p.is_file()).collect();
-        assert!(studies.len() >= 8);
-        for path in studies {
-            let study = study(&path);
-            let colors: BTreeSet<String> =
-                study.runs.iter().map(|run| run.color.to_string()).collect();
-            let mut seen: BTreeSet<&String> = BTreeSet::new();
-            for color in colors {
-                let names = names(&study, Color::try_from(color.clone()).unwrap());
-                assert!(names.len() < 2, "{}: {color} is {names:?}", path.display());
-                for name in names {
-                    assert!(seen.insert(name), "{}: {name} has two colours", path.display());
-                }
-            }
-        }
-    }
 
     #[test]
     fn a_value_beyond_a_limit_is_marked() {

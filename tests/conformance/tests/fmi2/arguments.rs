@@ -2,11 +2,8 @@
 //! that overlap: the call reports an error that names the argument, or it succeeds where the
 //! standard or importers need that.
 
-use conformance::interface::{CO_SIMULATION, Callbacks, ERROR, MODEL_EXCHANGE, OK, Status};
-use conformance::{Instance, c, fmus, fmus_and_interfaces, ok};
-use model_description::variable::VariableKind;
-use std::ffi::{CStr, c_int};
-use std::ptr::{null, null_mut};
+use crate::prelude::*;
+use conformance::interface::Callbacks;
 use std::sync::atomic::AtomicU64;
 
 type Call = fn(&Instance) -> Status;

@@ -1,11 +1,9 @@
 //! Tests of the functions that may be called in each state, and for which variables.
 
-use conformance::interface::{CO_SIMULATION, ERROR, FUNCTIONS, MODEL_EXCHANGE, OK, Status};
-use conformance::table::{Row, State, TABLE, instance_in, settable, states};
-use conformance::{Instance, c, driver, fmus, fmus_and_interfaces, ok};
-use model_description::variable::VariableKind;
-use std::ffi::{CString, c_int};
-use std::ptr::null_mut;
+use crate::prelude::*;
+use conformance::interface::FUNCTIONS;
+use conformance::table::{Row, State, settable};
+use std::ffi::CString;
 
 #[test]
 fn the_table_has_every_function_that_answers_for_an_instance() {
@@ -100,11 +98,7 @@ fn after_a_refused_call_a_reset_makes_a_new_instance() {
             let instance = instance_in(&fmu, fmu_type, state);
             assert_eq!(c!(instance, fmi2CancelStep(instance.component)), ERROR);
             ok!(instance, fmi2Reset());
-            assert!(
-                drive(&instance.initialized(), 0..3) == expected,
-                "{} from {state:?}",
-                fmu.name()
-            );
+            assert!(drive(&instance.initialized(), 0..3) == expected, "{} {state:?}", fmu.name());
         }
     }
 }

@@ -1,9 +1,9 @@
 //! Tests of the time derivatives of inputs and outputs in co-simulation, and of the FMUs that
 //! offer directional derivatives.
 
-use conformance::interface::{CO_SIMULATION, ERROR, Status};
-use conformance::{Instance, c, fmus, is_continuous_real, ok};
-use model_description::variable::{Causality, Variable};
+use crate::prelude::*;
+use conformance::is_continuous_real;
+use model_description::variable::Variable;
 
 fn set(instance: &Instance, reference: u32, order: i32, value: f64) -> Status {
     c!(instance, fmi2SetRealInputDerivatives(instance.component, &reference, 1, &order, &value))

@@ -1,8 +1,8 @@
 //! Tests that no function depends on the importer's floating-point environment, nor changes it.
 #![allow(unsafe_code)]
 
-use conformance::fmus_and_interfaces;
-use conformance::table::{Row, TABLE, instance_in, states};
+use crate::prelude::*;
+use conformance::table::Row;
 use std::arch::asm;
 
 /// Traps, rounding up and flushing to zero; and rounding down with all flags raised.

@@ -1,9 +1,8 @@
 //! A property of every FMU: whatever finite values it accepts, the values that it then returns with
 //! `fmi2OK` are finite, items of their enumerations, or true or false.
 
-use conformance::interface::{CO_SIMULATION, DISCARD, ERROR, OK};
-use conformance::{Fmu, Instance, c, fmus, ok};
-use model_description::variable::{Causality, VariableKind};
+use crate::prelude::*;
+use conformance::interface::DISCARD;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};

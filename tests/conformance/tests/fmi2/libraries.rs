@@ -1,8 +1,6 @@
 //! Tests of the libraries themselves.
 
-use conformance::interface::CO_SIMULATION;
-use conformance::{c, fmus};
-use std::ffi::CStr;
+use crate::prelude::*;
 use std::process::Command;
 
 #[test]
@@ -21,12 +19,8 @@ fn the_guid_selects_the_fmu() {
     let fmus = fmus();
     assert_eq!(fmus.len(), 13);
     for fmu in &fmus {
-        assert_eq!(
-            fmus.iter().filter(|other| other.guid() == fmu.guid()).count(),
-            1,
-            "{}",
-            fmu.name()
-        );
+        let same = fmus.iter().filter(|other| other.guid() == fmu.guid()).count();
+        assert_eq!(same, 1, "{}", fmu.name());
         // A saved state names the FMU to which it belongs.
         let state = fmu.instance(CO_SIMULATION).serialize();
         let guid = fmu.guid().to_bytes();

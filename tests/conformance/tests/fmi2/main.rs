@@ -10,6 +10,7 @@ mod environment;
 mod finite;
 mod libraries;
 mod platform;
+mod prelude;
 mod resources;
 mod states;
 mod steps;

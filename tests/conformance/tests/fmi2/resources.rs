@@ -1,8 +1,8 @@
 //! Tests of the resource location in every form that importers pass.
 #![cfg(unix)]
 
-use conformance::interface::{CO_SIMULATION, ERROR};
-use conformance::{Fmu, Instance, c, fmu, fmus};
+use crate::prelude::*;
+use conformance::fmu;
 use std::ffi::CString;
 use std::path::Path;
 

@@ -2,9 +2,8 @@
 //! anything is wrong with them. Their use in another process is tested with the packed archives
 //! (tests/test_states.py).
 
-use conformance::interface::{CO_SIMULATION, ERROR, FATAL, OK};
-use conformance::{Fmu, Instance, c, driver, fmus, fmus_and_interfaces, ok};
-use model_description::variable::VariableKind;
+use crate::prelude::*;
+use conformance::interface::FATAL;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;

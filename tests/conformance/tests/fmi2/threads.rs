@@ -1,7 +1,6 @@
 //! Tests of instances in several threads of one process.
 
-use conformance::interface::CO_SIMULATION;
-use conformance::{Bits, Fmu, Instance, fmus};
+use crate::prelude::*;
 use std::sync::Barrier;
 
 /// Number of ticks, large enough for the threads to overlap within optimisations.
@@ -27,18 +26,6 @@ fn eight_instances_in_eight_threads_give_the_bits_of_one() {
             }
         });
     }
-}
-
-#[test]
-fn different_fmus_in_threads_do_not_affect_each_other() {
-    let fmus = fmus();
-    let alone: Vec<_> = fmus.iter().map(run).collect();
-    std::thread::scope(|scope| {
-        let runs: Vec<_> = fmus.iter().map(|fmu| scope.spawn(|| run(fmu))).collect();
-        for ((result, alone), fmu) in runs.into_iter().zip(alone).zip(&fmus) {
-            assert!(result.join().unwrap() == alone, "{}", fmu.name());
-        }
-    });
 }
 
 struct Moving(Instance);

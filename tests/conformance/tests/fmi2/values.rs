@@ -1,11 +1,7 @@
 //! Tests of value references: one by one or all at once, wrong ones, repeated ones, and values at
 //! the limits.
 
-use conformance::interface::{CO_SIMULATION, ERROR, OK, Status};
-use conformance::{Instance, c, driver, fmus, ok};
-use model_description::variable::{Causality, VariableKind};
-use std::ffi::c_int;
-use std::ptr::null;
+use crate::prelude::*;
 
 #[test]
 fn one_reference_per_call_gives_what_all_in_one_call_give() {
@@ -27,11 +23,7 @@ fn one_reference_per_call_gives_what_all_in_one_call_give() {
                 let backwards = everything.iter().rev().flat_map(|&one| instance.bits(&[one]));
                 let mut backwards: Vec<_> = backwards.collect();
                 backwards.reverse();
-                assert!(
-                    forwards == expected && backwards == expected,
-                    "{} at tick {tick}",
-                    fmu.name()
-                );
+                assert!(forwards == expected && backwards == expected, "{}: {tick}", fmu.name());
                 assert_eq!(instance.real(input), value);
                 driver(fmu_type)(&instance, tick..tick + 1);
             }

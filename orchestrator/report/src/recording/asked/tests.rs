@@ -72,27 +72,6 @@ fn panels_of_several_runs_have_six_curves_at_most() {
 }
 
 #[test]
-fn limits_that_differ_are_drawn_with_the_names_of_their_runs() {
-    let limited = |name: &str, limit: f64| {
-        let mut signals = SIGNALS;
-        signals[3].2 = [limit; 2];
-        run(name, &signals, PANELS)
-    };
-    let runs = [limited("a", 5.0), limited("b", 4.0), limited("c", 5.0)];
-    let panels = of_experiments(&runs).unwrap();
-    let norms = panels.last().unwrap();
-    let names = ["a", "b", "c"].map(String::from);
-    let limits = norms.limits.iter().map(|limit| (limit.value, norms.limit_name(limit, &names)));
-    assert_eq!(
-        limits.collect::<Vec<_>>(),
-        [(5.0, "limit of norm, a, c".into()), (4.0, "limit of norm, b".into())]
-    );
-    assert_eq!(legend(norms, &["a", "b", "c"]), ["a", "b", "c"]);
-    let equal = of_experiments(&runs[..1]).unwrap();
-    assert_eq!(equal[0].limit_name(&equal[0].limits[0], &names[..1]), "limit of norm");
-}
-
-#[test]
 fn references_that_differ_from_the_first_runs_are_drawn_as_their_runs_own() {
     const FOLLOWING: &str = r#"panels = [{ name = "angle", curves = [
         { name = "alpha", of = "plant.attitude.alpha", reference = "law.reference" },
@@ -113,18 +92,6 @@ fn references_that_differ_from_the_first_runs_are_drawn_as_their_runs_own() {
     runs[1].time = vec![0.0, 2.0];
     let panels = of_experiments(&runs[..2]).unwrap();
     assert_eq!(legend(&panels[0], &names[..2]), ["α, a", "reference", "α, b", "reference, b"]);
-}
-
-#[test]
-fn a_legend_says_only_what_the_label_does_not() {
-    let runs = ["a", "b"].map(|name| run(name, &SIGNALS, ""));
-    let signals = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<_>>();
-    let alone = of_signals(&runs, &signals(&["plant.rate.p"])).unwrap();
-    assert_eq!(alone[0].label, "plant.rate.p");
-    assert_eq!(legend(&alone[0], &["a", "b"]), ["a", "b"]);
-    assert_eq!(legend(&of_signals(&runs[..1], &signals(&["law.limit"])).unwrap()[0], &["a"]), [""]);
-    let both = of_signals(&runs, &signals(&["plant.rate.*"])).unwrap();
-    assert_eq!(legend(&both[0], &["a", "b"]), ["p, a", "p, b", "q, a", "q, b"]);
 }
 
 #[test]
@@ -160,13 +127,6 @@ fn without_panels_all_recorded_variables_are_drawn_up_to_a_number() {
         many.iter().map(|(name, unit, values)| (name.as_str(), *unit, *values)).collect();
     let panels = of_experiments(&[run("a", &many, "")]).unwrap();
     assert_eq!(panels.iter().map(|panel| panel.curves.len()).collect::<Vec<_>>(), [6, 6, 6, 6]);
-}
-
-#[test]
-fn angles_are_written_by_their_symbols() {
-    assert_eq!(symbols("plant.attitude.alpha"), "plant.attitude.α");
-    assert_eq!(symbols("beta - sigma"), "β - σ");
-    assert_eq!(symbols("alphabet"), "alphabet");
 }
 
 #[test]
