@@ -3,6 +3,7 @@
 
 pub mod draws;
 pub mod entry;
+pub mod faulted;
 pub mod flight;
 pub mod navigated;
 pub mod norm_constraints;
