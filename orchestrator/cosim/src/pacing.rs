@@ -159,7 +159,6 @@ impl Pacer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::interrupt::Request;
     use crate::timer::fake::Fake;
 
     const MS: Duration = Duration::from_millis(1);
@@ -251,18 +250,5 @@ mod tests {
         let miss = report.worst_miss.unwrap();
         assert_eq!((miss.component.as_str(), miss.time), ("controller", 11.0));
         assert!((miss.late_ms - 8.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn a_request_to_end_cuts_a_wait_short() {
-        let timer = Rc::new(Fake::default());
-        let interrupt = Interrupt::default();
-        let clock = Clock::new(0.0, 10.0, 1.0).unwrap();
-        let factor = "1e-300".parse().unwrap();
-        let mut pacer = Pacer::new(factor, clock, timer, interrupt.clone(), std::iter::empty());
-        pacer.wait(0);
-        interrupt.ask(Request::INTERRUPT);
-        pacer.wait(1);
-        assert_eq!(interrupt.asked(), Some(Request::INTERRUPT));
     }
 }

@@ -161,8 +161,8 @@ mod tests {
                 "the start value 3 of x is outside its min and max",
             ),
             (
-                "min='0' max",
-                "min='3' no='1' max",
+                "min='0' max='2' start='1'",
+                "min='3' max='2'",
                 "the smallest value of x, 3, is above its largest, 2",
             ),
             ("r start='1'", "r start='1.5'", "the start value 1.5 of n is not a whole number"),

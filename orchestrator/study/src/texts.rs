@@ -43,18 +43,3 @@ fn percent(fractions: &Numbers) -> String {
     let (low, high) = fractions.extent();
     format!("{mean} [{},\u{a0}{}]", one(low), one(high))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn several_numbers_show_their_mean_and_extent() {
-        assert_eq!(several(&Numbers(vec![1.0, 1.0])), "1");
-        assert_eq!(several(&Numbers(vec![1.0, 2.0])), "1.5 [1,\u{a0}2]");
-        assert_eq!(several(&Numbers(Vec::new())), "–");
-        assert_eq!(difference(&Numbers(vec![-0.342])), "−34.2\u{a0}%");
-        assert_eq!(difference(&Numbers(vec![-0.998])), "0.002\u{a0}times");
-        assert_eq!(difference(&Numbers(vec![2.5])), "3.5\u{a0}times");
-    }
-}

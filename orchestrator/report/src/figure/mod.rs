@@ -294,24 +294,4 @@ mod tests {
         assert_eq!(panel.extent(true), Some((0.0, 5.0)));
         assert_eq!(panel.extent(false), Some((-1.0, 9.0)));
     }
-
-    #[test]
-    fn a_constant_is_drawn_to_its_own_magnitude() {
-        let range = |y: &[f64]| panel(vec![curve(Shape::Line, &[0.0, 1.0], y)]).range(false);
-        let (low, high) = range(&[135.6, 135.6 + 1e-12]);
-        assert!((low - 0.94 * 135.6).abs() < 1e-9 && (high - 1.06 * 135.6).abs() < 1e-9);
-        assert_eq!(range(&[0.0, 0.0]), (-1.0, 1.0));
-        assert_eq!(range(&[-2.0, -2.0]), (-2.12, -1.88));
-    }
-
-    #[test]
-    fn a_panel_without_values_has_a_range_all_the_same() {
-        let empty = panel(Vec::new());
-        assert_eq!((empty.range(false), empty.range(true)), ((0.0, 1.0), (0.0, 1.0)));
-        // The range must have ends whose logarithm is finite.
-        assert_eq!(Panel { log_x: true, ..empty }.range(true), (1.0, 10.0));
-        let zero = panel(vec![curve(Shape::Dots, &[0.0, 2.0], &[1.0, 1.0])]);
-        let (low, high) = Panel { log_x: true, ..zero }.range(true);
-        assert!(low > 0.0 && high > 2.0);
-    }
 }

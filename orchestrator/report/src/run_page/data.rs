@@ -174,17 +174,3 @@ fn words(item: &str) -> String {
     }
     text
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_as_short_as_a_screen_needs() {
-        let text = |value: f64| rounded(value, DIGITS).to_string();
-        assert_eq!(text(1.0 / 3.0), "0.33333");
-        assert_eq!(text(135_600.4), "135600");
-        assert_eq!(text(-0.0), "0");
-        assert_eq!(text(f64::NAN), "null");
-    }
-}

@@ -58,20 +58,6 @@ fn oracle_the_panel_of_an_experiment_with_the_norm_and_its_limit() {
 }
 
 #[test]
-fn panels_of_several_runs_have_six_curves_at_most() {
-    let runs: Vec<Recording> =
-        ["a", "b", "c", "d"].iter().map(|name| run(name, &SIGNALS, PANELS)).collect();
-    let panels = of_experiments(&runs).unwrap();
-    // One for p, one for q, one for the norms with their limit.
-    assert_eq!(panels.len(), 3);
-    assert!(panels.iter().all(|panel| panel.curves.len() == 4));
-    assert!(panels[0].limits.is_empty());
-    assert_eq!(panels[2].limits, [Limit { value: 5.0, runs: vec![0, 1, 2, 3] }]);
-    let panels = of_experiments(&runs[..2]).unwrap();
-    assert_eq!(names(&panels[0]), [("p", 0), ("q", 0), ("p", 1), ("q", 1)]);
-}
-
-#[test]
 fn references_that_differ_from_the_first_runs_are_drawn_as_their_runs_own() {
     const FOLLOWING: &str = r#"panels = [{ name = "angle", curves = [
         { name = "alpha", of = "plant.attitude.alpha", reference = "law.reference" },
@@ -117,16 +103,6 @@ fn signals_that_are_asked_for_are_grouped_by_unit_and_stem() {
     assert!(fault.ends_with("did you mean \"plant.rate.p\"?"), "{fault}");
     let fault = asked(&["plant.rates.*"]).unwrap_err();
     assert!(fault.contains("no recorded variable matches \"plant.rates.*\""), "{fault}");
-}
-
-#[test]
-fn without_panels_all_recorded_variables_are_drawn_up_to_a_number() {
-    let many: Vec<(String, &str, [f64; 2])> =
-        (0..40).map(|i| (format!("a.x[{i}]"), "m", [0.0, f64::from(i)])).collect();
-    let many: Vec<_> =
-        many.iter().map(|(name, unit, values)| (name.as_str(), *unit, *values)).collect();
-    let panels = of_experiments(&[run("a", &many, "")]).unwrap();
-    assert_eq!(panels.iter().map(|panel| panel.curves.len()).collect::<Vec<_>>(), [6, 6, 6, 6]);
 }
 
 #[test]
