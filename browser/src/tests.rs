@@ -102,13 +102,6 @@ fn an_entry_reaches_its_target_and_ends_there() {
     assert!(summary["moment_ratio"].as_f64().unwrap() < 1.0, "{summary}");
 }
 
-/// Outside of a page nothing computes its law, and no moment is invented.
-#[test]
-fn a_law_without_a_page_ends_the_flight() {
-    let refusal = flown(&json!({"controller": "own"})).unwrap_err();
-    assert!(refusal.contains("finite"), "{refusal}");
-}
-
 #[test]
 fn a_lost_attitude_ends_the_flight() {
     let set = json!({"plant.initial.beta": "61 deg"});
@@ -121,6 +114,8 @@ fn a_lost_attitude_ends_the_flight() {
 fn wrong_requests_are_refused_by_name() {
     let unknown = flown(&json!({"controller": "pid"})).unwrap_err();
     assert!(unknown.contains("'pid'"), "{unknown}");
+    // Outside of a page nothing computes its law, and no moment is invented.
+    assert!(flown(&json!({"controller": "own"})).unwrap_err().contains("finite"));
     for (set, words) in [
         (json!({"plant.nothing": 1}), "plant.nothing: there is no such parameter"),
         (json!({"planet.x": 1}), "planet: the experiment has no such component"),

@@ -1,32 +1,8 @@
 //! No tick of DLMPC allocates memory, apart from the inside of the cone solver.
-#![allow(unsafe_code)]
 
+use crate::counting::COUNT;
 use crate::prelude::*;
 use control::dlmpc::{Memory, Settings};
-use std::alloc::{GlobalAlloc, Layout, System};
-
-thread_local! {
-    static COUNT: Cell<usize> = const { Cell::new(0) };
-}
-
-/// The system's allocator with a count per thread.
-struct Counting;
-
-// SAFETY: everything is passed on to the system's allocator.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        COUNT.set(COUNT.get() + 1);
-        // SAFETY: the caller's promise is passed on.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promise is passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 #[test]
 fn ticks_without_the_cone_solver_allocate_nothing() {

@@ -3,6 +3,8 @@
 mod allocation;
 mod arrival;
 mod closed_loop;
+#[path = "../../export/fmi-export/tests/counting/mod.rs"]
+mod counting;
 mod delay;
 mod delay_estimate;
 mod design;

@@ -1,24 +1,12 @@
 //! The environment of x86-64 around a call that unwinds. Around other calls it is tested with every
 //! function of every FMU, in tests/conformance, and with hosts in C, tests/relations/test_hosts.py.
 #![cfg(target_arch = "x86_64")]
-#![allow(unsafe_code)]
+
+mod mxcsr;
 
 use float_environment::in_default;
-use std::arch::asm;
+use mxcsr::{mxcsr, set_mxcsr};
 use std::panic::{catch_unwind, resume_unwind};
-
-fn mxcsr() -> u32 {
-    let mut value = 0u32;
-    // SAFETY: the instruction stores the four bytes of the variable.
-    unsafe { asm!("stmxcsr [{}]", in(reg) &raw mut value, options(nostack)) };
-    value
-}
-
-fn set_mxcsr(value: u32) {
-    // SAFETY: the instruction loads four bytes. The tests set no reserved bit, and compute only in
-    // the environment that they set for it.
-    unsafe { asm!("ldmxcsr [{}]", in(reg) &raw const value, options(nostack)) };
-}
 
 /// Rounding down, up and toward zero, flushing to zero, traps, and all flags.
 const OTHERS: [u32; 6] = [0x3f80, 0x5f80, 0x7f80, 0x9fc0, 0x1900, 0x1fbf];

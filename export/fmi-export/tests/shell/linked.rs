@@ -56,19 +56,3 @@ fn calls_are_refused_as_through_the_c_interface() {
     counter.set_string(defect, "parameter").unwrap();
     assert!(refused(initialize(&mut counter, 1.0)).contains("defect = parameter"));
 }
-
-#[test]
-fn values_have_their_types() {
-    let mut counter = Linked::new(&Export::new::<Counter>());
-    assert_eq!(counter.description().name, "Counter");
-    let [increment, resets, count] =
-        ["increment", "resets", "count"].map(|name| reference(&counter, name));
-    counter.set_real(&[increment], &[3.0]).unwrap();
-    initialize(&mut counter, 1.0).unwrap();
-    counter.do_step(0.0, 0.1).unwrap();
-    let (mut number, mut value) = ([7], [0.0]);
-    counter.get_integer(&[resets], &mut number).unwrap();
-    counter.get_real(&[count], &mut value).unwrap();
-    assert_eq!((number, value), ([0], [3.0]));
-    assert_eq!(counter.take_warnings(), Vec::<String>::new());
-}

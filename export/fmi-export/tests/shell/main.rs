@@ -2,6 +2,8 @@
 #![allow(clippy::borrow_as_ptr, reason = "calls read better with `&x`")]
 
 mod counter;
+#[path = "../counting/mod.rs"]
+mod counting;
 #[path = "../../examples/lag/model.rs"]
 #[allow(unreachable_pub)]
 mod lag;
@@ -13,7 +15,6 @@ mod exchange;
 mod instances;
 mod linked;
 mod logging;
-mod saved;
 mod steps;
 mod values;
 

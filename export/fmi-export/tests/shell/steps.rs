@@ -98,3 +98,18 @@ fn a_step_to_the_end_of_the_simulation_is_discarded() {
     assert_eq!(instance.step(0.0, 0.5), FmiStatus::Ok);
     assert_eq!(has_terminated(), 0);
 }
+
+#[test]
+fn pending_input_derivatives_are_part_of_the_state() {
+    let instance = Instance::stepping();
+    let (order, value) = (1, 2.0);
+    let component = instance.component;
+    let status = c!(fmi2SetRealInputDerivatives(component, &U, 1, &order, &value));
+    assert_eq!(status, FmiStatus::Ok);
+    let state = instance.save();
+    assert_eq!(instance.step(0.0, 0.5), FmiStatus::Ok);
+    let expected = instance.real(X);
+    assert_eq!(c!(fmi2SetFMUstate(component, state)), FmiStatus::Ok);
+    assert_eq!(instance.step(0.0, 0.5), FmiStatus::Ok);
+    assert_eq!(instance.real(X).to_bits(), expected.to_bits());
+}

@@ -244,17 +244,4 @@ impl Instance {
         assert!(!state.is_null());
         state
     }
-
-    pub(crate) fn serialize(&self) -> Vec<u8> {
-        let mut state = self.save();
-        let mut size = 0;
-        assert_eq!(c!(fmi2SerializedFMUstateSize(self.component, state, &mut size)), FmiStatus::Ok);
-        let mut bytes = vec![0u8; size];
-        assert_eq!(
-            c!(fmi2SerializeFMUstate(self.component, state, bytes.as_mut_ptr().cast(), size)),
-            FmiStatus::Ok
-        );
-        assert_eq!(c!(fmi2FreeFMUstate(self.component, &mut state)), FmiStatus::Ok);
-        bytes
-    }
 }

@@ -1,26 +1,12 @@
 //! Tests that no function depends on the importer's floating-point environment, nor changes it.
-#![allow(unsafe_code)]
 
+use crate::mxcsr::{mxcsr, set_mxcsr};
 use crate::prelude::*;
 use conformance::table::Row;
-use std::arch::asm;
 
 /// Traps, rounding up and flushing to zero; and rounding down with all flags raised.
 const OTHERS: [u32; 2] = [0xd940, 0x3fbf];
 const DEFAULT: u32 = 0x1f80;
-
-fn mxcsr() -> u32 {
-    let mut value = 0u32;
-    // SAFETY: the instruction stores the four bytes of the variable.
-    unsafe { asm!("stmxcsr [{}]", in(reg) &raw mut value, options(nostack)) };
-    value
-}
-
-fn set_mxcsr(value: u32) {
-    // SAFETY: the instruction loads four bytes with no reserved bit. The tests compute nothing
-    // before they set the default again.
-    unsafe { asm!("ldmxcsr [{}]", in(reg) &raw const value, options(nostack)) };
-}
 
 #[test]
 fn every_function_answers_the_same_and_leaves_the_environment_as_it_is() {

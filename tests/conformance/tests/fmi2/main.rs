@@ -9,6 +9,9 @@ mod derivatives;
 mod environment;
 mod finite;
 mod libraries;
+#[cfg(target_arch = "x86_64")]
+#[path = "../../../../export/float-environment/tests/mxcsr/mod.rs"]
+mod mxcsr;
 mod platform;
 mod prelude;
 mod resources;

@@ -57,6 +57,7 @@ fn handles_and_bytes_bring_back_the_same_future() {
             ok!(instance, fmi2GetFMUstate(&mut handle));
             assert_eq!(handle, before);
             ok!(instance, fmi2Reset());
+            assert!(instance.serialize() == fmu.instance(fmu_type).serialize(), "{}", fmu.name());
             instance.restore(handle);
             assert!(instance.serialize() == present, "{}", fmu.name());
             // A state from bytes works in an instance that was never initialized.
