@@ -6,9 +6,6 @@
 #ifndef _WIN32
 #include <pthread.h>
 #endif
-#ifdef REACHES
-#include <sys/socket.h>
-#endif
 #include <unistd.h>
 
 enum { NOWHERE, LOAD, INSTANTIATE, INITIALIZE, GET, STEP, FREE, UNLOAD };
@@ -97,17 +94,6 @@ static void fault(int place, Logger logger, void *environment) {
         }
     }
 }
-
-#ifdef REACHES
-/* Writes a file and opens a socket; says so if neither can be had. */
-void reach(const char *path, Logger logger, void *environment) {
-    FILE *file = fopen(path, "w");
-    int network = socket(AF_INET, SOCK_STREAM, 0);
-    if (!file && network < 0) logger(environment, "model", 1, "reach", "no file, no network");
-    if (file) fclose(file);
-    if (network >= 0) close(network);
-}
-#endif
 
 __attribute__((constructor)) static void loaded(void) { fault(LOAD, NULL, NULL); }
 __attribute__((destructor)) static void unloaded(void) { fault(UNLOAD, NULL, NULL); }

@@ -111,9 +111,6 @@ int fmi2EnterInitializationMode(Model *model) {
     return model->gain < 100.0 ? OK : complain(model, ERROR, "gain too large:", model->gain);
 }
 int fmi2ExitInitializationMode(Model *model) {
-#ifdef REACHES
-    reach(REACHES, model->callbacks->logger, model->callbacks->environment);
-#endif
 #ifdef OUTSIDE
     attempt(model->seed, model->callbacks->logger, model->callbacks->environment);
 #endif
