@@ -8,7 +8,6 @@ pub mod aerodynamics;
 pub mod air;
 pub mod atmosphere;
 pub mod axes;
-pub mod calibration;
 pub mod data;
 pub mod disturbance;
 pub mod dynamics;

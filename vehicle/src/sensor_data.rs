@@ -1,8 +1,6 @@
-//! Data of the embedded file of sensors: sensor sets, the surrounding fields and the calibration
-//! sequence.
+//! Data of the embedded file of sensors: sensor sets and the surrounding fields.
 
 use crate::aerodynamics::FOOT;
-use crate::calibration::Sequence;
 use crate::data;
 use crate::platform::Surroundings;
 use crate::sensors::{Line, PerSensor};
@@ -24,8 +22,6 @@ pub struct SensorData {
     pub mems: PerSensor<Triad>,
     /// Sensor set without any errors.
     pub ideal: PerSensor<Triad>,
-    /// Rotation sequence for calibrating the sensors.
-    pub calibration: Sequence,
     /// Grades of inertial sensors.
     grades: [Grade; 3],
 }
@@ -95,12 +91,6 @@ impl SensorData {
     /// Returns the data of the embedded file.
     pub fn embedded() -> Self {
         let file = file();
-        let Calibration {
-            alpha_rate_deg_s,
-            sigma_rate_deg_s,
-            beta_amplitude_deg,
-            beta_frequency_deg_s,
-        } = file.calibration;
         Self {
             surroundings: Surroundings {
                 gravity: file.surroundings.gravity,
@@ -115,12 +105,6 @@ impl SensorData {
             mems: file.mems.triads(),
             ideal: file.ideal.triads(),
             grades: [file.navigation, file.tactical, file.calibrated],
-            calibration: Sequence {
-                alpha_rate: alpha_rate_deg_s.to_radians(),
-                sigma_rate: sigma_rate_deg_s.to_radians(),
-                beta_amplitude: beta_amplitude_deg.to_radians(),
-                beta_frequency: beta_frequency_deg_s.to_radians(),
-            },
         }
     }
 }
@@ -140,7 +124,6 @@ struct File {
     navigation: Grade,
     tactical: Grade,
     calibrated: Grade,
-    calibration: Calibration,
 }
 
 #[derive(Deserialize)]
@@ -156,15 +139,6 @@ struct Fields {
 struct Times {
     period: f64,
     delay: f64,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Calibration {
-    alpha_rate_deg_s: f64,
-    sigma_rate_deg_s: f64,
-    beta_amplitude_deg: f64,
-    beta_frequency_deg_s: f64,
 }
 
 #[derive(Deserialize)]

@@ -2,10 +2,12 @@
 
 use super::CALIBRATED;
 use crate::harness::platform::{
-    CALIBRATION_DURATION, CALIBRATION_SEED, calibrated, calibration, lines, mems,
+    CALIBRATION_DURATION, CALIBRATION_SEED, calibrated, calibration, calibration_angles, lines,
+    mems,
 };
 use crate::prelude::*;
 use control::estimation::{CalibrationMode, CalibrationStatus, Estimator, Health, Settings};
+use vehicle::platform::body_from_velocity;
 use vehicle::sensors::PerSensor;
 
 /// Required is ‖W A − I‖ ≤ 5e-3 at a noise of 0.5 %. The noise of the set is 0.6 %, without the
@@ -64,4 +66,31 @@ fn a_calibration_flight_cut_short_is_refused() {
     let [estimated, actual] = [memory.estimate.angles, trajectory[trajectory.len() - 1].angles]
         .map(|angles| Rotation3::from_matrix_unchecked(body_from_velocity(&angles)));
     assert!(estimated.angle_to(&actual) < 2f64.to_radians(), "and the attitude is found with it");
+}
+
+/// Returns `count` directions spread evenly over the sphere.
+fn directions(count: u32) -> impl Iterator<Item = Vector3<f64>> {
+    (0..count).map(move |k| {
+        let z = 1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(count);
+        let (sine, cosine) = (f64::from(k) * std::f64::consts::PI * (3.0 - 5f64.sqrt())).sin_cos();
+        Vector3::new(cosine, sine, 0.0) * (1.0 - z * z).sqrt() + Vector3::new(0.0, 0.0, z)
+    })
+}
+
+#[test]
+fn in_two_minutes_the_calibration_sequence_sees_every_direction_within_13_degrees() {
+    let data = SensorData::embedded();
+    let initial = Scenario::crmpc2022().initial_angles;
+    for fixed in [data.surroundings.field.normalize(), Vector3::z()] {
+        let seen: Vec<_> = (0..1200)
+            .map(|k| {
+                let [angles, _] = calibration_angles(&initial, 0.1 * f64::from(k));
+                body_from_velocity(&angles) * fixed
+            })
+            .collect();
+        let farthest = directions(1000)
+            .map(|axis| seen.iter().map(|seen| seen.dot(&axis)).fold(-1.0, f64::max))
+            .fold(1.0, f64::min);
+        assert!(farthest > 13f64.to_radians().cos(), "{} deg", farthest.acos().to_degrees());
+    }
 }

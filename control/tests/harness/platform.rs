@@ -12,6 +12,7 @@ use control::estimation::{
 use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3};
 use vehicle::fixes::Devices;
 use vehicle::kinematics::{self, Kinematics};
+use vehicle::math::sin_cos;
 use vehicle::plant::{Plant, angles, rates};
 use vehicle::platform::{Pose, Readings};
 use vehicle::scenario::Scenario;
@@ -75,13 +76,25 @@ pub fn scenario(seed: u64) -> Vec<Truth> {
         .collect()
 }
 
+/// Returns the attitude angles Θ and Θ̇ (rad, rad/s) of the calibration sequence at `time` (s) after
+/// a start at the angles `initial`: α and σ turn at constant rates, and β swings.
+///
+/// Together α, β and σ repeat after an hour only. β swings far enough for the y axis to meet the
+/// field, which is 23° short of lying in the plane that the y axis sweeps as σ turns.
+pub fn calibration_angles(initial: &Vector3<f64>, time: f64) -> [Vector3<f64>; 2] {
+    let [alpha_rate, sigma_rate, amplitude, frequency] =
+        [37.0, 60.0, 40.0, 11.3].map(f64::to_radians);
+    let (sine, cosine) = sin_cos(frequency * time);
+    let swing = Vector3::new(alpha_rate * time, amplitude * sine, sigma_rate * time);
+    [initial + swing, Vector3::new(alpha_rate, amplitude * frequency * cosine, sigma_rate)]
+}
+
 /// Returns the true states along the calibration sequence.
 pub fn calibration(duration: f64) -> Vec<Truth> {
     let start = Scenario::crmpc2022().initial_angles;
-    let sequence = SensorData::embedded().calibration;
     let at = |time: f64| {
-        let (state, _) = sequence.state_at(Kinematics::Printed, &start, time);
-        Truth { time, angles: angles(&state), rates: rates(&state) }
+        let [angles, angle_rates] = calibration_angles(&start, time);
+        Truth { time, angles, rates: kinematics::r_inverse(&angles) * angle_rates }
     };
     times(duration).map(at).collect()
 }
