@@ -252,26 +252,22 @@ fn published_a_thicker_layer_has_less_chatter_and_a_larger_error() {
 
 // Tests with actuators that fall short of the command.
 
-/// Actuators that follow a command with a limited rate per axis, N m/s.
-fn rate_limited(rate: f64, period: f64) -> impl FnMut(Vector3<f64>) -> Vector3<f64> {
+/// Runs a law with actuators whose moment changes by 1.5e5 N m/s per axis at most.
+fn with_slow_actuators<C: Controller>(mut law: C, fed: bool) -> Outcome {
     let mut moment = Vector3::zeros();
-    let step = rate * period;
-    move |command: Vector3<f64>| {
-        let change: Vector3<f64> = command - moment;
-        moment += change.map(|change| change.clamp(-step, step));
+    let follow = |command: Vector3<f64>| {
+        moment += (command - moment).map(|change: f64| change.clamp(-1.5e3, 1.5e3));
         moment
-    }
-}
-
-/// Runs SOTVSMC/DO with actuators of 1.5e5 N m/s.
-fn with_slow_actuators(anti_windup: bool, fed: bool) -> Outcome {
-    let mut controller = Tvsmc::new(Settings { anti_windup, ..Settings::sotvsmc_do() }).unwrap();
-    simulate(&mut controller, &Scenario::tvsmc2015(), fed, rate_limited(1.5e5, 0.01), |_, _| ())
+    };
+    simulate(&mut law, &Scenario::tvsmc2015(), fed, follow, |_, _| ())
 }
 
 #[test]
 fn regress_re_anchoring_halves_the_settling_time_of_slow_actuators() {
-    let (with, without) = (with_slow_actuators(true, true), with_slow_actuators(false, true));
+    let [with, without] = [true, false].map(|anti_windup| {
+        let law = SotvsmcDo::new(Settings { anti_windup, ..Settings::sotvsmc_do() }).unwrap();
+        with_slow_actuators(law, true)
+    });
     assert!((with.settling.max() - 3.16).abs() < 0.05, "{:?}", with.settling);
     assert!((without.settling.max() - 7.08).abs() < 0.05, "{:?}", without.settling);
     assert!(with.rms.max() < 1e-5, "{:?}", with.rms);
@@ -279,11 +275,7 @@ fn regress_re_anchoring_halves_the_settling_time_of_slow_actuators() {
 
 #[test]
 fn the_observer_must_know_what_was_achieved() {
-    let run = |fed| {
-        let scenario = Scenario::tvsmc2015();
-        simulate(&mut btvsmc_do(), &scenario, fed, rate_limited(1.5e5, 0.01), |_, _| ())
-    };
-    let (fed, unfed) = (run(true), run(false));
+    let [fed, unfed] = [true, false].map(|fed| with_slow_actuators(btvsmc_do(), fed));
     assert!(fed.rms.max() < 5e-4, "{:?}", fed.rms);
     assert!(unfed.rms.max() > 10.0, "{:?}", unfed.rms);
 }

@@ -6,12 +6,10 @@ mod own_vehicle;
 use crate::crmpc::CrmpcLaw;
 use crate::dlmpc::DlmpcLaw;
 use crate::tvsmc::{self, TvsmcLaw};
-use crate::{Btvsmc, BtvsmcDo, Crmpc, Dlmpc, Fbl, Lqr, SotvsmcDo};
+use crate::{BtvsmcDo, Crmpc, Dlmpc, Lqr};
 use controller_export::reference::Choice;
 use controller_export::{ControllerFmu, Law};
-use fmi_export::{Context, Failure, Inputs, LastEvent, Model, describe};
-use model_description::ModelDescription;
-use model_description::variable::Causality;
+use fmi_export::{Context, Failure, Inputs, LastEvent, Model};
 use nalgebra::Vector3;
 use vehicle::Scenario;
 use vehicle::reference::Reference;
@@ -55,26 +53,6 @@ fn refusal<M: Model>(change: impl FnOnce(&mut M)) -> String {
         Err(failure) => failure.to_string(),
         Ok(()) => String::new(),
     }
-}
-
-#[test]
-fn descriptions_are_consistent_and_interchangeable() {
-    let names = |description: &ModelDescription, causality: Causality| -> Vec<String> {
-        let chosen = description.variables.iter().filter(|v| v.causality == causality);
-        chosen.map(|v| v.name.clone()).collect()
-    };
-    let (crmpc, dlmpc, lqr) = (describe::<Crmpc>(), describe::<Dlmpc>(), describe::<Lqr>());
-    let sliding =
-        [describe::<Fbl>(), describe::<Btvsmc>(), describe::<BtvsmcDo>(), describe::<SotvsmcDo>()];
-    for other in [&crmpc, &dlmpc].into_iter().chain(&sliding) {
-        other.check().unwrap();
-        lqr.check().unwrap();
-        assert_ne!(other.guid(), lqr.guid());
-        assert_eq!(names(other, Causality::Input), names(&lqr, Causality::Input));
-        let outputs = names(other, Causality::Output);
-        assert!(names(&lqr, Causality::Output).iter().all(|name| outputs.contains(name)));
-    }
-    assert_ne!(crmpc.guid(), dlmpc.guid());
 }
 
 /// Asserts that the moments of every optimisation period are the same, in however many of these

@@ -42,6 +42,12 @@ fn step(instance: &mut ReentryPlant, from: f64, to: f64) -> Result<(), Failure> 
     instance.step(from, to, &Constant, &mut |_| {})
 }
 
+/// Takes so many steps of a length (s) from 0 on. Returns what ends them, if anything.
+fn fly(instance: &mut ReentryPlant, length: f64, steps: u32) -> Option<Failure> {
+    let at = |k: u32| f64::from(k) * length;
+    (0..steps).find_map(|k| step(instance, at(k), at(k + 1)).err())
+}
+
 fn outputs(instance: &mut ReentryPlant, time: f64) -> Output {
     instance.calculate(time, LastEvent::InputSet).unwrap();
     instance.output

@@ -1,8 +1,5 @@
 //! Outputs between steps and events.
 
-use super::actuators::far;
-use super::entry::entering;
-use super::model_exchange::{exchange, tabulated};
 use super::prelude::*;
 use super::sensors::mems;
 use super::{delayed, in_model_exchange, outputs, started, step};
@@ -92,34 +89,4 @@ fn looking_changes_nothing() {
         }
     }
     assert_eq!(outputs(&mut looked_at, 1.28), outputs(&mut left_alone, 1.28));
-}
-
-/// Moments under way, moving surfaces, the row of a table and samples are part of the state.
-#[test]
-fn a_saved_state_goes_on_bit_for_bit() {
-    let delayed: fn(&mut ReentryPlant) = |instance| instance.parameters.converter.delay = 0.117;
-    let in_steps = [delayed, far, tabulated, mems, entering].map(|set| (set, false));
-    let exchanged = [far, tabulated, mems].map(|set| (set, true));
-    for (case, (set, exchanges)) in in_steps.into_iter().chain(exchanged).enumerate() {
-        let mut instances = vec![started(set)];
-        for k in 0..35 {
-            if k == 5 || k == 15 {
-                let saved = serde_json::to_string(&instances[0]).unwrap();
-                instances.push(serde_json::from_str(&saved).unwrap());
-            }
-            let [from, to] = [0.04 * f64::from(k), 0.04 * f64::from(k + 1)];
-            let mut shown = Vec::new();
-            for instance in &mut instances {
-                instance.input.moment = Vector3::new(1e4 * from.sin(), -1e4 * from.cos(), 5e3);
-                let mut events = Vec::new();
-                if exchanges {
-                    events = exchange(instance, from, to);
-                } else {
-                    step(instance, from, to).unwrap();
-                }
-                shown.push((events, outputs(instance, to)));
-            }
-            assert!(shown.iter().all(|end| *end == shown[0]), "case {case}, step {k}");
-        }
-    }
 }

@@ -62,17 +62,11 @@ fn outputs_follow_the_time_that_is_set() {
 }
 
 #[test]
-fn states_have_nominal_values() {
+fn event_indicators_follow_the_states_which_have_nominal_values() {
     let (instance, mut nominal) = (Instance::in_event_mode(), f64::NAN);
     let component = instance.component;
     let status = c!(fmi2GetNominalsOfContinuousStates(component, &mut nominal, 1));
     assert_eq!((status, nominal), (FmiStatus::Ok, 2.0));
-}
-
-#[test]
-fn event_indicators_follow_the_states() {
-    let instance = Instance::in_event_mode();
-    let component = instance.component;
     assert_eq!(c!(fmi2EnterContinuousTimeMode(component)), FmiStatus::Ok);
     for x in [0.25, 1.0, 3.0] {
         let mut indicator = f64::NAN;

@@ -13,6 +13,12 @@ fn at(time: f64, stop: Option<f64>) -> Instance {
     instance
 }
 
+fn has_terminated(instance: &Instance) -> i32 {
+    let mut terminated = -1;
+    assert_eq!(c!(fmi2GetBooleanStatus(instance.component, 3, &mut terminated)), FmiStatus::Ok);
+    terminated
+}
+
 #[test]
 fn the_communication_point_may_differ_by_rounding_only() {
     // The time, and differences that are taken and refused: 1e-9 of the time, but at most 0.1 ms
@@ -57,9 +63,7 @@ fn a_step_that_the_model_refuses_can_be_repeated_from_a_saved_state() {
     let mut status = FmiStatus::Ok;
     assert_eq!(c!(fmi2GetStatus(instance.component, 0, &mut status)), FmiStatus::Ok);
     assert_eq!(status, FmiStatus::Discard);
-    let mut terminated = -1;
-    assert_eq!(c!(fmi2GetBooleanStatus(instance.component, 3, &mut terminated)), FmiStatus::Ok);
-    assert_eq!(terminated, 0);
+    assert_eq!(has_terminated(&instance), 0);
     assert_eq!(c!(fmi2SetFMUstate(instance.component, state)), FmiStatus::Ok);
     assert_eq!(instance.step(0.5, 0.25), FmiStatus::Ok);
 }
@@ -73,17 +77,12 @@ fn a_step_to_the_end_of_the_simulation_is_discarded() {
     let instance = Instance::new("Counter", CO_SIMULATION);
     assert_eq!(instance.set_string(DEFECT, c"end"), FmiStatus::Ok);
     instance.initialize();
-    let has_terminated = || {
-        let mut terminated = -1;
-        assert_eq!(c!(fmi2GetBooleanStatus(instance.component, 3, &mut terminated)), FmiStatus::Ok);
-        terminated
-    };
     assert_eq!(instance.step(0.0, 0.5), FmiStatus::Ok);
-    assert_eq!(has_terminated(), 0);
+    assert_eq!(has_terminated(&instance), 0);
     let state = instance.save();
     assert_eq!(instance.step(0.5, 0.5), FmiStatus::Discard);
     instance.said(&["the count is over"]);
-    assert_eq!(has_terminated(), 1);
+    assert_eq!(has_terminated(&instance), 1);
     let mut time = f64::NAN;
     assert_eq!(c!(fmi2GetRealStatus(instance.component, 2, &mut time)), FmiStatus::Ok);
     assert_eq!(time, crate::counter::ENDS_AT);
@@ -92,11 +91,11 @@ fn a_step_to_the_end_of_the_simulation_is_discarded() {
     assert_eq!(instance.step(time, 0.5), FmiStatus::Error);
     // A state from before the end has not ended.
     assert_eq!(c!(fmi2SetFMUstate(instance.component, state)), FmiStatus::Ok);
-    assert_eq!(has_terminated(), 0);
+    assert_eq!(has_terminated(&instance), 0);
     assert_eq!(c!(fmi2Reset(instance.component)), FmiStatus::Ok);
     instance.initialize();
     assert_eq!(instance.step(0.0, 0.5), FmiStatus::Ok);
-    assert_eq!(has_terminated(), 0);
+    assert_eq!(has_terminated(&instance), 0);
 }
 
 #[test]

@@ -9,9 +9,9 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// Parameters with which an instance has states of other kinds: none, a table, surfaces and sensors,
-/// and a delay, which works in co-simulation only.
+/// an entry, and a delay, which works in co-simulation only.
 fn preparations(fmu: &Fmu, fmu_type: i32) -> &'static [fn(&Instance)] {
-    const ALL: [fn(&Instance); 4] = [
+    const ALL: [fn(&Instance); 5] = [
         |_| (),
         tabulate,
         |instance| {
@@ -19,6 +19,7 @@ fn preparations(fmu: &Fmu, fmu_type: i32) -> &'static [fn(&Instance)] {
             ok!(instance, fmi2SetInteger(&reference, 1, &2));
             instance.choose("actuation", "surfacesAndJets");
         },
+        |instance| instance.choose("translation", "entry"),
         |instance| {
             let reference = instance.fmu.reference("actuation.delay");
             instance.ok(instance.set_real(reference, 0.1));
@@ -26,7 +27,7 @@ fn preparations(fmu: &Fmu, fmu_type: i32) -> &'static [fn(&Instance)] {
     ];
     match (fmu.name(), fmu_type) {
         ("ReentryPlant", CO_SIMULATION) => &ALL,
-        ("ReentryPlant", _) => &ALL[..3],
+        ("ReentryPlant", _) => &ALL[..4],
         _ => &ALL[..1],
     }
 }
