@@ -82,11 +82,8 @@ def packages(folder: Path, names: list[str]) -> Path:
     for each, (content, _) in LIBRARIES.items():
         name = "orchestrator.exe" if each.startswith("windows") else "orchestrator"
         (folder / each / name).write_bytes(content + b"program")
-    for name in ("browser", "man"):
-        (folder / name).mkdir()
+    (folder / "browser").mkdir()
     (folder / "browser" / "index.html").write_text("the page")
-    for name in ("orchestrator", "orchestrator-run"):
-        (folder / "man" / f"{name}.1").write_text(f".TH {name} 1\n")
     return folder
 
 
@@ -174,10 +171,6 @@ def test_archives_hold_fmus_licences_and_experiments(content, dist):
             if path.suffix in (".toml", ".csv")
         }
         assert "schema/experiment.json" in content
-        pages = {path for path in content if path.startswith("man/")}
-        # Windows has no man.
-        expected = set() if system.startswith("windows") else {"orchestrator.1", "orchestrator-run.1"}
-        assert pages == {f"man/man1/{name}" for name in expected}
     for place, path in places.items():
         assert content[place][0] == path.read_bytes()
 

@@ -109,13 +109,6 @@ pub(crate) enum Command {
         /// Shell that the script is for.
         shell: clap_complete::Shell,
     },
-    /// Write the manual pages of the program and of its commands, for `man orchestrator`.
-    #[command(hide = true)]
-    Man {
-        /// Folder for the pages, for example one called man1 that `man` searches.
-        #[arg(value_name = "DIR")]
-        folder: PathBuf,
-    },
     /// List experiments, studies, campaigns and FMUs by the names that the other commands take.
     List {
         /// Folder to search [default: those beside the program and in ORCHESTRATOR_PATH].

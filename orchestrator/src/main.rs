@@ -11,7 +11,6 @@ mod flight;
 mod inspect;
 mod judge;
 mod list;
-mod man;
 mod margins;
 mod pack;
 mod picture;
@@ -115,7 +114,6 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             clap_complete::generate(shell, &mut definition(), "orchestrator", out);
             Ok(())
         }
-        Command::Man { folder } => man::write(definition(), &folder),
         Command::List { folder, json } => list::list(folder.as_deref(), json, out),
     }
 }

@@ -53,7 +53,7 @@ For {systems}.
     {program} run crmpc-2022/crmpc-robust  flies an experiment
     {program} --help                      explains all commands
 
-The program finds experiments/ and fmu/ beside itself, from any folder.{manual}
+The program finds experiments/ and fmu/ beside itself, from any folder.
 
 LICENSE-MIT and LICENSE-APACHE are the licences of program and FMUs, either of which may be chosen.
 LICENSES.txt and LICENSES-rust-std.html are those of what is linked in.
@@ -106,7 +106,7 @@ def check(dist: Path) -> None:
             if path.stem not in described:
                 raise Fault(f"{path} is no FMU of this version: remove it")
     programs = [program(dist, platform) for platform in platforms]
-    for path in (*programs, dist / "man" / "orchestrator.1"):
+    for path in programs:
         if not path.is_file():
             raise Fault(f"{path} does not exist: run scripts/package")
 
@@ -190,14 +190,10 @@ def write_programs(dist: Path, output: Path, version: str, epoch: int) -> None:
     for platform, systems in PLATFORMS.items():
         binary = program(dist, platform)
         name = binary.stem if binary.suffix else f"./{binary.name}"
-        manual = "" if binary.suffix else " `man -M man orchestrator` explains it, too."
-        page = readme(PROGRAM_README, version=version, systems=systems, program=name, manual=manual)
+        page = readme(PROGRAM_README, version=version, systems=systems, program=name)
         fmus = [(f"fmu/{name}", content, mode) for name, content, mode in packed_fmus(dist / platform / "fmu")]
-        # Windows has no man.
-        pages = [] if binary.suffix else sorted((dist / "man").glob("*.1"))
         entries = [
             (binary.name, binary.read_bytes(), 0o755),
-            *((f"man/man1/{path.name}", path.read_bytes(), 0o644) for path in pages),
             *experiments,
             *fmus,
             *licence_files(output),

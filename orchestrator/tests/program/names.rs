@@ -166,23 +166,3 @@ fn a_bad_value_is_blamed_on_its_option() {
     let (_, _, errors) = bench.call(&["run", "short"]);
     assert!(errors.contains("short.toml: [simulation] stop = 0.5 s"), "{errors}");
 }
-
-#[test]
-fn manual_pages_are_written() {
-    let bench = Bench::new();
-    let (code, _, errors) = bench.call(&["man", "man/man1"]);
-    assert_eq!(code, 0, "{errors}");
-    let page = |name: &str| fs::read_to_string(bench.path(&format!("man/man1/{name}.1"))).unwrap();
-    let (_, help, _) = bench.call(&["--help"]);
-    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1);
-    // Texts that are wrapped go on further to the right.
-    let commands =
-        commands.take_while(|line| !line.is_empty()).filter(|line| !line.starts_with("   "));
-    let commands: Vec<&str> = commands.filter_map(|line| line.split_whitespace().next()).collect();
-    assert!(commands.contains(&"run"), "{help}");
-    for command in commands.into_iter().filter(|command| *command != "help") {
-        assert!(page(&format!("orchestrator-{command}")).contains("Examples:"), "{command}");
-    }
-    assert!(page("orchestrator").contains("orchestrator\\-run(1)"));
-    bench.fails(1, &["man", "loop.toml/man1"], "loop.toml/man1");
-}
