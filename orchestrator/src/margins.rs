@@ -19,6 +19,10 @@ use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
 
+/// Refusal of `--guarantee`.
+const NO_ANSWERS: &str =
+    "--guarantee: the experiment has no [observe.guarantee.accepted], or its FMUs no guarantee";
+
 /// Arguments of `margins`.
 #[derive(Args)]
 pub(crate) struct PrintMargins {
@@ -51,10 +55,9 @@ impl PrintMargins {
     fn print_accepted(&self, out: &mut impl Write, interrupt: &Interrupt) -> Result<(), Failure> {
         let (mut system, _) = self.subject.system(&self.subject.path()?)?;
         let guarantee = system.experiment.observe.guarantee.clone();
-        let asked = guarantee.and_then(|guarantee| guarantee.accepted).ok_or_else(|| {
-            let problem = "--guarantee: the experiment has no [observe.guarantee.accepted]";
-            Error::experiment(problem)
-        })?;
+        let given = guarantee.filter(|guarantee| system.has(&guarantee.in_force));
+        let asked = given.and_then(|guarantee| guarantee.accepted);
+        let asked = asked.ok_or_else(|| Error::experiment(NO_ANSWERS))?;
         let answers = accepted::answers(&mut system, &asked, interrupt)?;
         if self.json {
             return Ok(writeln!(out, "{:#}", json!(answers))?);
