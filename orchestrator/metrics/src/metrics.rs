@@ -74,11 +74,9 @@ pub struct Metrics {
 const ALWAYS: [&str; 6] =
     ["real_time_factor", "wall_s", "loop_delay_s", "samples", "completed", "lost_at"];
 
-/// Metrics of every run that depend on the machine.
-const OF_THE_MACHINE: [&str; 2] = ["real_time_factor", "wall_s"];
-
-/// Metrics that are texts.
-const TEXTS: [&str; 2] = ["guarantee_status", "guarantee_unfounded"];
+/// Metrics that depend on the machine, or are texts.
+const NOT_RECORDED: [&str; 4] =
+    ["real_time_factor", "wall_s", "guarantee_status", "guarantee_unfounded"];
 
 /// Further names in `metrics.json`, which hold more than one number.
 const GROUPS: [&str; 2] = ["step_us", "real_time"];
@@ -101,8 +99,7 @@ impl Metrics {
     /// not on the machine.
     pub fn reproducible_names(observe: &Observe) -> Vec<String> {
         let mut names = Self::names(observe);
-        let left_out: Vec<&str> = OF_THE_MACHINE.into_iter().chain(TEXTS).collect();
-        names.retain(|name| !left_out.contains(&name.as_str()));
+        names.retain(|name| !NOT_RECORDED.contains(&name.as_str()));
         names
     }
 
