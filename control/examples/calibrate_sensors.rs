@@ -1,4 +1,4 @@
-//! Calibrates the MEMS set of the vehicle's data on a flight of its calibration sequence, and
+//! Calibrates the MEMS set of the vehicle's data on the calibration flight of the tests, and
 //! prints the file `control/data/sensor-calibration.toml`:
 //!
 //! ```text
@@ -14,8 +14,8 @@ use harness::platform::{CALIBRATION_DURATION, CALIBRATION_SEED, calibrated, mems
 
 fn main() {
     println!(
-        "# Corrections W (m - b) of the MEMS set of vehicle/data/sensors.toml, in SI units. From {CALIBRATION_DURATION} s of its calibration\n\
-         # sequence with seed {CALIBRATION_SEED}: gyroscope and accelerometer against the platform's own angles by linear least squares, the\n\
+        "# Corrections W (m - b) of the MEMS set of vehicle/data/sensors.toml, in SI units. From {CALIBRATION_DURATION} s of the calibration\n\
+         # flight with seed {CALIBRATION_SEED}: gyroscope and accelerometer against the platform's own angles by linear least squares, the\n\
          # magnetometer by an ellipsoid. Written by the example calibrate_sensors."
     );
     let Settings { corrections, .. } = calibrated(&mems(CALIBRATION_SEED), CALIBRATION_DURATION);
