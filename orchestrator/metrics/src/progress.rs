@@ -136,3 +136,16 @@ impl Parts {
         self.bar.finish_and_clear();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_have_units_and_no_more_digits_than_matter() {
+        let rates = [64.3074, 9.9499, 9.951, 0.25, 0.0].map(rate);
+        let expected =
+            ["64 per second", "9.9 per second", "10 per second", "15 per minute", "0.0 per minute"];
+        assert_eq!(rates, expected);
+    }
+}
