@@ -1,5 +1,16 @@
 """Settings in which some variables act and no experiment has them, with an experiment's inputs."""
 
+from conftest import ROOT, TARGET
+
+
+def skew() -> str:
+    """A shipped vehicle without a plane of symmetry. Several processes may write it, the same each."""
+    text = (ROOT / "orchestrator" / "experiments" / "entry" / "vehicles" / "lifting-body.toml").read_text(encoding="utf-8")
+    path = TARGET / "skew-body.toml"
+    path.write_text(text.replace("\nIxz =", "\nIxy = 5000.0\nIyz = 5000.0\nIxz ="), encoding="utf-8")
+    return str(path)
+
+
 ROWS = range(1, 9)
 FAILING = ("tvsmc-2015/allocated", {"effector.fault.kind": "slow", "effector.fault.number": 1})
 TURNING = ("entry/from-120km", {"reference.externalRate.beta": 0.01})
@@ -20,6 +31,7 @@ SCENES = {
     "ReentryPlant": {
         "a surface that becomes slow": FAILING,
         "fixes of a star tracker": ("entry/navigated", {"sensor.star.period": 0.2, "sensor.gnss.period": 0.2}),
+        "a body without a plane of symmetry": ("entry/own-vehicle", {"vehicle.file": skew()}),
         "rotating Earth": ("crmpc-2022/lqr", {"trajectory.earthRate": 7.292115e-5}),
         "air of six rows": ("entry/from-120km", {"air.rows": 6} | {f"air.altitude[{k}]": 117e3 + 500 * k for k in ROWS[:6]} | {f"air.wind.{axis}[{k}]": 9.0 * k for k in ROWS[:6] for axis in ("north", "east")}),
         "disturbance of eight rows": ("crmpc-2022/lqr", {"disturbance.kind": "table", "disturbance.table.rows": 8} | {f"disturbance.table.time[{k}]": 4.0 * k for k in ROWS} | {f"disturbance.table.{axis}[{k}]": (-0.1) ** k for k in ROWS for axis in ("alpha", "beta", "sigma")}),
