@@ -44,8 +44,7 @@ def after(page: Page, count: int) -> None:
 
 def opened(browser: Browser, address: str = "", **options) -> Page:
     """The page once its first flight is shown. A fault in it fails the test."""
-    # The tour of a new visitor would change the settings.
-    page = browser.new_context(**{"reduced_motion": "reduce", **options}).new_page()
+    page = browser.new_context(**options).new_page()
     page.faults = []
     page.on("pageerror", lambda error: page.faults.append(str(error)))
     page.goto(f"{PAGE.as_uri()}#{address}")
@@ -214,10 +213,10 @@ def test_what_an_address_gets_wrong_is_named(chromium):
     page = opened(chromium, "controller=LQR&plant.disturbance.bound=4+deg/s2")
     assert 'no controller "LQR"' in page.inner_text("#said") and page.evaluate("location.hash") == "#controller=crmpc"
     for wrong in ("plant.disturbance.bound=2+rad", "controller.saturation=yes"):
-        page = chromium.new_context(reduced_motion="reduce").new_page()
+        page = chromium.new_context().new_page()
         page.goto(f"{PAGE.as_uri()}#{wrong}")
         page.wait_for_function("document.querySelector('#verdict').textContent.startsWith('Refused')")
-    page = chromium.new_context(reduced_motion="reduce").new_page()
+    page = chromium.new_context().new_page()
     page.goto(f"{PAGE.as_uri()}#plant.disturbance.bound=900+deg/s2")
     page.wait_for_function("document.querySelector('#said').textContent.includes('disturbance.bound')")
     # The page goes on from there.
@@ -228,7 +227,7 @@ def test_what_an_address_gets_wrong_is_named(chromium):
 
 def test_one_file_is_everything(chromium):
     assert PAGE.stat().st_size <= 2_500_000
-    page = chromium.new_context(offline=True, reduced_motion="reduce").new_page()
+    page = chromium.new_context(offline=True).new_page()
     asked = []
     page.on("request", lambda request: asked.append(request.url.split(":")[0]))
     page.goto(PAGE.as_uri())

@@ -105,7 +105,7 @@ def test_a_moment_of_any_size_is_scaled_into_its_limit(chromium):
 
 def test_a_law_of_an_address_is_not_run_unasked(chromium):
     code = "function law(state) {\n  return [1e3, 0, 0]; // a & b\n}"
-    page = chromium.new_context(reduced_motion="reduce").new_page()
+    page = chromium.new_context().new_page()
     page.goto(f"{PAGE.as_uri()}#controller=own&law={quote_plus(code)}")
     page.wait_for_function("document.querySelector('#verdict').textContent.startsWith('Not flown yet')")
     assert page.input_value("#code") == code and flights(page) == 0

@@ -91,19 +91,6 @@ def test_another_law_flies_under_the_same_disturbance(chromium):
     assert page.evaluate("flight.ghost") is None
 
 
-def test_a_new_visitor_is_shown_around_until_any_touch(chromium):
-    page = chromium.new_context().new_page()
-    page.goto(PAGE.as_uri())
-    after(page, 0)
-    page.wait_for_function("time > 0.3")
-    assert page.evaluate("location.hash") == ""
-    page.keyboard.press("Shift")
-    page.wait_for_function("!proof.tour && !busy")
-    stood = page.evaluate("time")
-    page.wait_for_timeout(300)
-    assert page.evaluate("time") == stood
-
-
 @pytest.mark.parametrize("wait", [0, 1500])
 def test_nothing_is_said_of_a_flight_before_it_is_flown(chromium, wait):
     page = chromium.new_context().new_page()

@@ -298,9 +298,7 @@ function pose(at) {
   const [now, why] = standing(row);
   const text = now === undefined ? "no guarantee" : `guarantee ${why?.split(":")[0] ?? (now === "pending" ? "pending" : "in force")}`;
   view.show({
-    angles: part(1), reference: part(7), rates: part(4), moment: part(10),
-    rateLimit: flight.summary.limits.rate, momentLimit: flight.summary.limits.moment,
-    light: { state: LIGHTS[now] ?? "none", text },
+    angles: part(1), reference: part(7), light: { state: LIGHTS[now] ?? "none", text },
   });
 }
 
@@ -485,9 +483,7 @@ function begin({ text, error }) {
   $("version").textContent = version;
   player.pace(50);
   point(time);
-  const isNew = location.hash.length < 2 && !matchMedia("(prefers-reduced-motion: reduce)").matches;
   load(location.hash.slice(1));
-  if (isNew) proof.begin();
 }
 
 async function save() {

@@ -1,13 +1,12 @@
-// The section "See the guarantee": the picture, what it says at the chosen time, the three disturbances to look at, and
-// a tour of them for somebody who has just arrived.
+// The section "See the guarantee": the picture, what it says at the chosen time, and the three disturbances to look at.
 "use strict";
 
-// Disturbances: name, meaning, settings that differ from the scenario, and seconds of the tour.
+// Disturbances: name, meaning, and settings that differ from the scenario.
 const DISTURBANCES = [
-  ["The paper's noise", "drawn anew at every tick, in each axis", {}, 6.5],
-  ["A hostile one", "always pushes the way the vehicle turns", { "plant.disturbance.kind": "alongRate" }, 6.5],
+  ["The paper's noise", "drawn anew at every tick, in each axis", {}],
+  ["A hostile one", "always pushes the way the vehicle turns", { "plant.disturbance.kind": "alongRate" }],
   ["More than was assumed", "one and a half times what the law counts on",
-    { "plant.disturbance.kind": "alongRate", "plant.disturbance.bound": "3 deg/s2" }, 9],
+    { "plant.disturbance.kind": "alongRate", "plant.disturbance.bound": "3 deg/s2" }],
 ];
 const ACTING = "plant.disturbance.bound";
 const ASSUMED = "controller.disturbance.bound";
@@ -16,8 +15,7 @@ const QUANTITIES = 5;
 
 class Proof {
   constructor() {
-    this.picture = new GuaranteePicture($("plan"), (at) => { this.stop(); point(at); });
-    this.tour = null;
+    this.picture = new GuaranteePicture($("plan"), point);
     this.buttons = DISTURBANCES.map(([name, meaning], index) => {
       const button = document.createElement("button");
       button.type = "button";
@@ -27,17 +25,14 @@ class Proof {
     });
     $("disturbances").replaceChildren(...this.buttons);
     $("assumed").oninput = () => this.assume($("assumed").valueAsNumber);
-    for (const event of ["pointerdown", "keydown", "wheel"]) {
-      window.addEventListener(event, () => this.stop(), { capture: true, passive: true });
-    }
   }
 
   // Settings of one of the three disturbances; what is assumed stays unless it is the paper's again.
-  choose(index, quietly = false) {
+  choose(index) {
     for (const name of ["plant.disturbance.kind", ACTING, ASSUMED, POLICY]) delete settings.set[name];
     for (const [name, value] of Object.entries(DISTURBANCES[index][2])) settings.change(name, value);
-    if (quietly) fly();
-    else { build(); changed([], null); }
+    build();
+    changed([], null);
   }
 
   // Index of the disturbance that is set; −1 for another one.
@@ -99,38 +94,6 @@ class Proof {
     $("promise").textContent = holds
       ? `Whatever the disturbance does within its bound, the vehicle keeps to ${rate.toFixed(1)} deg/s and ${moment.toFixed(0)} kN m.`
       : `Guarantee ${why ?? "not given"}.`;
-  }
-
-  // Shows the three disturbances one after another.
-  begin() {
-    const stages = DISTURBANCES.map(([, , , seconds], index) => ({ index, seconds }));
-    this.tour = { stages, begun: null };
-    this.choose(0, true);
-    point(0);
-    const frame = (now) => {
-      if (!this.tour) return;
-      this.tour.begun ??= now;
-      const { index, seconds } = this.tour.stages[0];
-      const at = (now - this.tour.begun) / 1000;
-      if (at <= seconds) {
-        point(at);
-      } else {
-        this.tour.stages.shift();
-        this.tour.begun = null;
-        if (!this.tour.stages.length) { this.choose(0, true); point(1.2); this.stop(); return; }
-        this.choose(index + 1, true);
-        point(0);
-      }
-      requestAnimationFrame(frame);
-    };
-    requestAnimationFrame(frame);
-  }
-
-  stop() {
-    if (!this.tour) return;
-    this.tour = null;
-    changed([], null);
-    build();
   }
 }
 

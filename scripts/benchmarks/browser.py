@@ -26,7 +26,6 @@ DRAG = """async (name) => {
 
 
 def first(browser: Browser, address: str) -> float:
-    # A page that stays open goes on with its tour.
     with browser.new_context() as context:
         page = context.new_page()
         page.goto(address)

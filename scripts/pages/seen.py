@@ -42,7 +42,7 @@ def main() -> None:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
         for scheme, name in (("light", "see-guarantee"), ("dark", "see-guarantee-dark")):
             size = {"width": 760, "height": 900}
-            page = browser.new_context(viewport=size, color_scheme=scheme, reduced_motion="reduce").new_page()
+            page = browser.new_context(viewport=size, color_scheme=scheme).new_page()
             page.goto(PAGE.as_uri())
             page.wait_for_function(FLOWN.format(0))
             taken = frames(page)

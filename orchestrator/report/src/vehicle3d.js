@@ -4,8 +4,6 @@
 //   view.show({
 //     angles: [alpha, beta, sigma],          // rad: angle of attack, sideslip, bank
 //     reference: [alpha, beta, sigma],       // rad, of the ghost; left out: no ghost
-//     rates: [p, q, r], rateLimit: 0.087,    // rad/s, a bar against its limit; left out: no bar
-//     moment: [x, y, z], momentLimit: 1e5,   // N m, likewise
 //     flaps: [left, right],                  // rad, positive downwards; left out: not deflected
 //     light: { state: "good", text: "guarantee in force" },   // good, warn, bad or none
 //   });
@@ -134,11 +132,10 @@ class Vehicle3D {
     };
     this.colour = (name) => style.getPropertyValue(`--${name}`).trim() || defaults[name];
     context.font = `12px ${style.fontFamily || "sans-serif"}`;
-    const bars = [this.state.rates, this.state.moment].filter(Boolean).length;
-    this.size = { width, height, scale: Math.min(width / 18.5, (height - 24 * bars) / 14.5), middle: [width * 0.53, (height - 24 * bars) / 2 + 14] };
+    this.size = { width, height, scale: Math.min(width / 18.5, height / 14.5), middle: [width * 0.53, height / 2 + 14] };
     this.ground();
     this.vehicle();
-    this.instruments();
+    this.words();
   }
 
   // Place on the canvas of a point in the axes of the velocity, with its depth.
@@ -257,7 +254,7 @@ class Vehicle3D {
     return `rgb(${parts.join(" ")})`;
   }
 
-  instruments() {
+  words() {
     const { context, state, size } = this;
     const { light } = state;
     if (light && light.text) {
@@ -279,34 +276,5 @@ class Vehicle3D {
       context.textBaseline = "middle";
       context.fillText("dashed: reference", size.width - 12, 17.5);
     }
-    const rows = [
-      ["rate", state.rates, state.rateLimit, 180 / Math.PI, "deg/s"],
-      ["moment", state.moment, state.momentLimit, 1e-3, "kN m"],
-    ].filter(([, values]) => values);
-    rows.forEach(([name, values, limit, factor, unit], i) => {
-      this.bar(name, Math.hypot(...values), limit, factor, unit, size.height - 16 - 24 * (rows.length - 1 - i));
-    });
-  }
-
-  // The norm as a bar; the limit is the mark at two thirds of its width.
-  bar(name, norm, limit, factor, unit, y) {
-    const { context, size } = this;
-    const [left, right] = [64, size.width - 122];
-    const mark = left + ((right - left) * 2) / 3;
-    const end = Math.min(right, left + ((mark - left) * norm) / limit);
-    // A limit counts as met up to rounding.
-    const exceeds = norm > limit * (1 + 1e-9);
-    context.fillStyle = this.colour("line");
-    context.fillRect(left, y - 4, right - left, 8);
-    context.fillStyle = exceeds ? this.colour("bad") : this.colour("muted");
-    context.fillRect(left, y - 4, Math.max(1, end - left), 8);
-    context.fillStyle = this.colour("ink");
-    context.fillRect(mark - 0.75, y - 8, 1.5, 16);
-    context.textBaseline = "middle";
-    context.textAlign = "right";
-    context.fillText(name, left - 10, y);
-    context.textAlign = "left";
-    const digits = limit * factor < 20 ? 1 : 0;
-    context.fillText(`${(norm * factor).toFixed(digits)} of ${(limit * factor).toFixed(digits)} ${unit}`, right + 10, y);
   }
 }

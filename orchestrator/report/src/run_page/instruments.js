@@ -80,12 +80,6 @@ class Instruments {
     const at = (list) => (list && list.every((values) => values[frame] !== null) ? list.map((values) => values[frame]) : undefined);
     const state = { angles: at(vehicle.angles) || [0, 0, 0], light: this.light(time) };
     for (const key of ["reference", "flaps"]) if (at(vehicle[key])) state[key] = at(vehicle[key]);
-    for (const [key, limit] of [["rates", "rateLimit"], ["moment", "momentLimit"]]) {
-      if (at(vehicle[key]) && vehicle[limit]) {
-        // The values are rounded: one that lies at its limit may seem to lie beyond it.
-        Object.assign(state, { [key]: at(vehicle[key]), [limit]: vehicle[limit] * (1 + 5e-5) });
-      }
-    }
     const degrees = (angle) => minus(((angle * 180) / Math.PI).toFixed(1));
     const [alpha, beta, sigma] = state.angles.map(degrees);
     this.canvas.setAttribute("aria-label", `Vehicle at ${time.toFixed(1)} s: α ${alpha}, β ${beta}, σ ${sigma} deg; ${state.light.text}`);
