@@ -2,7 +2,6 @@
 //! inertia and measurement error within the assumptions of the guarantee.
 
 pub use crate::random::Random;
-use crate::random::sign;
 use control::crmpc::{Crmpc, Plan, Settings};
 use control::delay::{Delayed, Latency};
 use control::error::DesignError;
@@ -39,7 +38,7 @@ enum Waveform {
 
 impl Waveform {
     fn random(random: &mut Random) -> Self {
-        let direction = sign(random.between(-1.0, 1.0));
+        let direction = random.between(-1.0, 1.0).signum();
         match random.below(5) {
             0 => Self::White,
             1 => Self::Corner(random.corner()),
@@ -97,7 +96,7 @@ impl Flight {
         if random.below(4) == 0 {
             // Near the edge of the domain, and on the way to it.
             let edge = settings.sideslip_domain * random.between(0.9, 1.0);
-            angles.y = sign(random.between(-1.0, 1.0)) * edge;
+            angles.y = random.between(-1.0, 1.0).signum() * edge;
         }
         let more = &mut Random::new(seed ^ 1 << 41);
         let slow = (Waveform::random(more), more.corner() * settings.slow_angle_error);
@@ -196,9 +195,9 @@ impl Flight {
                 let place = (time / period).floor() as u64;
                 Random::new(place ^ (period.to_bits() >> 20)).corner()
             }
-            Waveform::AlongRate(direction) => (r * plant::rates(state)).map(sign) * direction,
+            Waveform::AlongRate(direction) => (r * plant::rates(state)).map(f64::signum) * direction,
             Waveform::AlongMoment(direction) => {
-                (r * self.body.inverse * moment).map(sign) * direction
+                (r * self.body.inverse * moment).map(f64::signum) * direction
             }
         }
     }

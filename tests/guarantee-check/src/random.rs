@@ -37,11 +37,6 @@ impl Random {
 
     /// Returns a corner of that box.
     pub(crate) fn corner(&mut self) -> Vector3<f64> {
-        self.vector().map(sign)
+        self.vector().map(f64::signum)
     }
-}
-
-/// Returns the sign of a value, and 1 for zero.
-pub(crate) fn sign(value: f64) -> f64 {
-    if value < 0.0 { -1.0 } else { 1.0 }
 }

@@ -49,14 +49,11 @@ impl Tally {
     /// Checks a plan.
     fn record(&mut self, seed: u64, recorded: &Recorded, check: &PlanCheck) {
         let verdict = check.check(&recorded.plan, recorded.age);
-        self.plans += 1;
-        self.left = Some(self.left.map_or(verdict.left, |left| left.min(&verdict.left)));
-        if !verdict.confirmed() {
-            self.not_confirmed += 1;
-            if self.refuted.len() < SHOWN {
-                self.refuted.push(Refuted { seed, recorded: recorded.clone(), verdict });
-            }
-        }
+        let left = Some(verdict.left);
+        let failed = !verdict.confirmed();
+        let refuted = failed.then(|| Refuted { seed, recorded: recorded.clone(), verdict });
+        let refuted = refuted.into_iter().collect();
+        self.add(Self { plans: 1, left, not_confirmed: failed.into(), refuted });
     }
 }
 
@@ -73,8 +70,7 @@ pub fn check_flights(
     let mut tally = Tally::default();
     for seed in seeds {
         let flight = Flight::random(settings, seed, duration)?;
-        let observe = |recorded: &Recorded| tally.record(seed, recorded, &check);
-        flight.record(observe).map_err(|error| error.to_string())?;
+        flight.record(|plan| tally.record(seed, plan, &check)).map_err(|e| e.to_string())?;
     }
     Ok(tally)
 }
