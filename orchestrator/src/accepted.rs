@@ -19,7 +19,7 @@ use toml::Value;
 const EXACT: f64 = 1e-4;
 /// Part of the way from the accepted to the refused value at which the next one is tried. To say why
 /// it refuses, an instance may compute for long.
-const PART: f64 = 0.25;
+const PART: f64 = 0.06;
 /// Multiple of the value that is set up to which an accepted bound is looked for.
 const FAR: f64 = 1e6;
 

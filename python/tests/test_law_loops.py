@@ -217,7 +217,6 @@ IDLE, ACTS = "controller.weight.P[1]", "controller.limit.rate"
     "fly",
     [
         lambda folder, name: experiment("lqr", set={name: 0.1}, stop=1.0, law=pd_law),
-        lambda folder, name: linearise("lqr", set={name: 0.1}, at=1.0, open="plant.moment.*", law=pd_law),
         lambda folder, name: margins("lqr", set={name: 0.1}, at=1.0, open="plant.moment.*", law=pd_law),
         lambda folder, name: campaign(changed(folder, f'[set]\n"{name}" = 0.1\n'), law=pd_law).run(),
         lambda folder, name: campaign(
