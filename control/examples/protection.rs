@@ -14,31 +14,34 @@ use vehicle::noise::uniform;
 fn main() {
     let flights = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(20);
     let seeds: Vec<u64> = (900..900 + flights).collect();
-    for (device, kind, size) in [
-        (0, None, 1.0),
-        (0, Frozen, 1.0),
-        (0, Dropout, 1.0),
-        (0, Late, 1.0),
-        (0, Clock, 1.0),
-        (0, Position, 1.0),
-        (0, Velocity, 1.0),
-        (1, Attitude, 0.2),
-        (1, Attitude, 1.0),
-        (1, Frozen, 1.0),
-        (2, Gyroscope, 0.01),
-        (2, Gyroscope, 0.1),
-        (2, Accelerometer, 0.01),
-        (2, Accelerometer, 0.1),
+    for (device, kind, size, guarded) in [
+        (0, None, 1.0, 0.0),
+        (0, Frozen, 1.0, 0.0),
+        (0, Dropout, 1.0, 0.0),
+        (0, Late, 1.0, 0.0),
+        (0, Clock, 1.0, 0.0),
+        (0, Position, 1.0, 0.0),
+        (0, Velocity, 1.0, 0.0),
+        (1, Attitude, 0.2, 0.0),
+        (1, Attitude, 1.0, 0.0),
+        (1, Frozen, 1.0, 0.0),
+        (2, Gyroscope, 0.01, 0.0),
+        (2, Gyroscope, 0.1, 0.0),
+        (2, Gyroscope, 0.1, 10.0),
+        (2, Accelerometer, 0.01, 0.0),
+        (2, Accelerometer, 0.1, 0.0),
     ] {
         let flown = harness::in_parallel(&seeds, |&seed| {
             let [start, length] = uniform(seed, 55).map(|draw: f64| 0.5 + 0.5 * draw);
             let window = [1500.0 * start, 1500.0 * start + 600.0 * length];
-            exceeded(&faulty(device, kind, size, window, seed))
+            let mut case = faulty(device, kind, size, window, seed);
+            case.settings.guarded = f64::to_radians(guarded / 3600.0);
+            exceeded(&case)
         });
         let mean = [0, 1].map(|i| flown.iter().map(|one| one[i]).sum::<f64>() / flown.len() as f64);
         let hit = [0, 1].map(|i| flown.iter().filter(|one| one[i] > 0.0).count());
         println!(
-            "| {device} {kind:?} {size} | {:.3} % {} | {:.3} % {} |",
+            "| {device} {kind:?} {size}, guarded {guarded}°/h | {:.3} % {} | {:.3} % {} |",
             100.0 * mean[0],
             hit[0],
             100.0 * mean[1],

@@ -193,6 +193,18 @@ fn errors_are_within_their_protection() {
     }
 }
 
+/// A step of the gyroscope's bias that is guarded against is covered, and goes beyond the bound if it
+/// is not.
+#[test]
+fn a_step_of_the_bias_is_covered_if_it_is_guarded_against() {
+    for (seed, start) in [(900, 100.0), (901, 500.0), (902, 900.0)] {
+        let mut case = faulty(2, FaultKind::Gyroscope, 0.1, [start, start + 600.0], seed);
+        assert!(exceeded(&case)[0] > 0.05, "{seed}");
+        case.settings.guarded = f64::to_radians(10.0 / 3600.0);
+        assert_eq!(exceeded(&case)[0], 0.0, "{seed}");
+    }
+}
+
 /// Without a fault nothing is said, and each kind of fault is said by its device.
 #[test]
 fn what_contradicts_is_named() {

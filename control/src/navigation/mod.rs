@@ -117,7 +117,7 @@ impl Navigation {
         let felt = Felt { rate: felt.rate + unbiased[0], force: felt.force + unbiased[1] };
         self.show(&mut shown, (time, &state), &felt, wind);
         (memory.health, memory.contradiction) = self.health(running, time, &shown.deviations);
-        shown.protection = self.protection(&shown.deviations, running.misalignment, memory.health);
+        shown.protection = self.protection(&shown.deviations, running, memory.health);
         if shown.is_finite() {
             memory.shown = shown;
         } else {

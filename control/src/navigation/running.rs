@@ -31,6 +31,10 @@ const STILL: u32 = 5;
 /// Time since the last sample from which the motion counts as unseen and the navigation as lost,
 /// and a clock that lags is not believed, s.
 pub(super) const UNSEEN_AFTER: f64 = 0.5;
+/// Specific force from which fixes of the motion show the attitude, m/s², and the share of the time
+/// before that each leaves in doubt.
+const SHOWING: f64 = 1.0;
+const DOUBTED: f64 = 0.8;
 
 /// State once a sample has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -65,6 +69,8 @@ pub(super) struct Running {
     /// Time of the last fix, and of the last measurement of the air's forces, s.
     pub(super) fixed: f64,
     felt_air: f64,
+    /// Time in which nothing has shown the attitude, s.
+    pub(super) turning: f64,
     /// Measurements of each source so far.
     pub(super) watches: [Watch; 4],
     /// What the receiver has said of its motion, and the error by the last fix of the star tracker
@@ -216,6 +222,7 @@ impl Navigation {
             offset: [Error::zeros(); 2],
             fixed: line.time,
             felt_air: line.time,
+            turning: 0.0,
             watches: [Watch::default(); 4],
             heard: Heard::default(),
             pointed: None,
@@ -247,6 +254,7 @@ impl Navigation {
         let before = running.last.fixes;
         (running.state, running.last) = (state, *line);
         running.way.0 += elapsed;
+        running.turning += elapsed;
         running.way.1 += pushed;
         self.decay(running, elapsed);
         self.measure(running, &before);
@@ -336,6 +344,12 @@ impl Navigation {
         if matches!(source, Source::Gnss | Source::Star) {
             running.fixed = now;
         }
+        let shows = running.last.force.norm() >= SHOWING;
+        running.turning *= match source {
+            Source::Star => 0.0,
+            Source::Gnss if shows => DOUBTED,
+            _ => 1.0,
+        };
         running.covariance = *covariance;
         running.state.correct(error, 0.0);
         running.history.correct(error, now);

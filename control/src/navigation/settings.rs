@@ -50,6 +50,10 @@ pub struct Settings {
     /// When the navigation counts as healthy.
     #[setting(file)]
     pub health: Trust,
+    /// Step of the gyroscope's bias that `protection.attitude` covers, beyond its instability: it
+    /// then grows by this rate while neither stars nor fixes under a force show the attitude.
+    #[setting(name = "protection.gyroscope", unit = "rad/s", min = 0.0, max = 0.1, nominal = 1e-5)]
+    pub guarded: f64,
 }
 
 /// Errors of an inertial sensor that the filter expects.
@@ -179,6 +183,7 @@ impl Default for Settings {
             drag: Drag { model: 0.15, correlation: 2e4 },
             blend: 3.0,
             health: Trust { deviation: 1_f64.to_radians(), after: 5.0 },
+            guarded: 0.0,
         }
     }
 }

@@ -5,6 +5,7 @@ use super::air::Relative;
 use super::device::Navigation;
 use super::filter::{self, Covariance, Error, along};
 use super::line::Health;
+use super::running::Running;
 use super::strapdown::{Felt, State};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -183,12 +184,11 @@ impl Navigation {
         }
     }
 
-    /// Returns the bounds on the errors that are shown, given the largest misalignment (rad) that
-    /// the star tracker can have.
+    /// Returns the bounds on the errors that are shown.
     pub(super) fn protection(
         &self,
         Deviations { angles, flow, position, .. }: &Deviations,
-        misalignment: f64,
+        &Running { misalignment, turning, .. }: &Running,
         health: Health,
     ) -> Protection {
         let knows = matches!(health, Health::Aided | Health::Bridging | Health::Degraded);
@@ -197,8 +197,9 @@ impl Navigation {
         }
         let deviation = angles.z.max(flow[0]).max(flow[1]);
         let hidden = if misalignment > 0.0 { misalignment + deviation } else { 0.0 };
+        let turned = self.settings.guarded * turning;
         Protection {
-            attitude: (PROTECTED * deviation).max(hidden).min(PI),
+            attitude: ((PROTECTED * deviation).max(hidden) + turned).min(PI),
             position: PROTECTED * 3_f64.sqrt() * position,
         }
     }

@@ -195,7 +195,9 @@ impl Flight {
                 let place = (time / period).floor() as u64;
                 Random::new(place ^ (period.to_bits() >> 20)).corner()
             }
-            Waveform::AlongRate(direction) => (r * plant::rates(state)).map(f64::signum) * direction,
+            Waveform::AlongRate(direction) => {
+                (r * plant::rates(state)).map(f64::signum) * direction
+            }
             Waveform::AlongMoment(direction) => {
                 (r * self.body.inverse * moment).map(f64::signum) * direction
             }
