@@ -257,6 +257,17 @@ def test_axe_finds_no_fault(runs, opened):
         assert found.violations_count == 0, found.generate_report()
 
 
+def test_figures_can_be_read_on_a_phone(tmp_path, opened):
+    call("run", "from-120km", "--stop", "100", "--page", "--quiet", "--out", tmp_path / "run", cwd=os.getcwd())
+    call("reproduce", "two-loop-smc", "--members", "1", "--quiet", "--out", tmp_path / "study", cwd=os.getcwd())
+    sizes = "texts => texts.filter(text => text.getBoundingClientRect().width > 0).map(text => parseFloat(getComputedStyle(text).fontSize) * Math.sqrt(text.getScreenCTM().a ** 2 + text.getScreenCTM().b ** 2))"
+    for path in (tmp_path / "run" / "page.html", tmp_path / "study" / "report.html"):
+        page = opened(path, viewport={"width": 390, "height": 844})
+        drawn = page.locator("svg text").evaluate_all(sizes)
+        assert len(drawn) > 20 and min(drawn) >= 9.0, path
+        assert page.evaluate("document.documentElement.scrollWidth") == 390
+
+
 def test_the_page_of_an_entry_flight(tmp_path, opened):
     call("run", "from-120km", "--page", "--quiet", "--out", tmp_path / "run", cwd=os.getcwd())
     path = tmp_path / "run" / "page.html"
