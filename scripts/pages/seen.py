@@ -26,12 +26,11 @@ def frames(page) -> list[Image.Image]:
     taken = []
     for index, last in SCENES:
         count = page.evaluate("Number(document.documentElement.dataset.flights)")
-        page.evaluate(f"proof.choose({index}, true)")
+        page.evaluate(f"proof.choose({index})")
         page.wait_for_function(FLOWN.format(count))
         for number in range(int(last / STEP) + 1):
             page.evaluate(f"point({number * STEP})")
-            picture = page.locator("#proof > div").screenshot()
-            taken.append(Image.open(io.BytesIO(picture)).convert("RGB"))
+            taken.append(Image.open(io.BytesIO(page.locator("#proof > div").screenshot())).convert("RGB"))
     return taken
 
 
@@ -41,8 +40,7 @@ def main() -> None:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
         for scheme, name in (("light", "see-guarantee"), ("dark", "see-guarantee-dark")):
-            size = {"width": 760, "height": 900}
-            page = browser.new_context(viewport=size, color_scheme=scheme).new_page()
+            page = browser.new_context(viewport={"width": 760, "height": 900}, color_scheme=scheme).new_page()
             page.goto(PAGE.as_uri())
             page.wait_for_function(FLOWN.format(0))
             taken = frames(page)
@@ -52,7 +50,6 @@ def main() -> None:
             path = ROOT / "docs" / "images" / f"{name}.gif"
             first.save(path, save_all=True, append_images=others, duration=int(1000 * SHOWN), loop=0, optimize=True)
             print(f"{path.stat().st_size / 1e6:.2f} MB  {path.relative_to(ROOT)}")
-        browser.close()
 
 
 if __name__ == "__main__":
