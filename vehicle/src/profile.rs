@@ -89,15 +89,6 @@ impl Profile {
             Self::Table(table) => table.at(time),
         }
     }
-
-    /// Times (s, ascending) right after which the reference may jump.
-    pub fn jumps(&self) -> impl Iterator<Item = f64> + '_ {
-        let segments = match self {
-            Self::Piecewise(segments) => segments.as_slice(),
-            Self::Table(_) => &[],
-        };
-        segments.iter().take(segments.len().saturating_sub(1)).map(|segment| segment.until)
-    }
 }
 
 impl Segment {

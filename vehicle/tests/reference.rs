@@ -10,7 +10,10 @@ use vehicle::{Profile, Reference};
 /// of its angles, at times away from jumps.
 fn derivative_error(profile: &Profile, from: f64, to: f64) -> f64 {
     let h = 1e-3;
-    let jumps: Vec<f64> = profile.jumps().collect();
+    let jumps: Vec<f64> = match profile {
+        Profile::Piecewise(segments) => segments.iter().map(|segment| segment.until).collect(),
+        Profile::Table(_) => vec![],
+    };
     let times = (0..400).map(|k| from + (to - from) * (f64::from(k) + 0.37) / 400.0);
     times
         .filter(|time| jumps.iter().all(|jump| (time - jump).abs() > 3.0 * h))

@@ -109,12 +109,6 @@ impl Parts {
         self.bar.disable_steady_tick();
     }
 
-    /// Counts one more part as finished.
-    pub fn finished(&self, what: &str) {
-        self.bar.set_message(format!(", {what}"));
-        self.advance(1);
-    }
-
     /// Counts more parts as finished.
     pub fn advance(&self, count: u64) {
         self.bar.inc(count);
