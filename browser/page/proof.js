@@ -100,7 +100,6 @@ class Proof {
 // The plans of a flight, from the module's numbers: the beginning, then times, rates, their bounds, moments, theirs.
 function readPlans(values) {
   const plans = [];
-  if (!values.length) return plans;
   const count = 25;
   for (let from = 0; from < values.length; from += 1 + QUANTITIES * count) {
     const part = (index, factor) => Array.from(values.subarray(from + 1 + index * count, from + 1 + (index + 1) * count), (value) => value * factor);
