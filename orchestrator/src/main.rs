@@ -37,10 +37,10 @@ use tracing_subscriber::EnvFilter;
 fn main() -> ExitCode {
     let _watch = crash::watch();
     let arguments = command_line::parse();
-    // A study may have a thousand runs, and its report counts their warnings. The results table of
-    // a campaign holds the messages of instances.
+    // A study may have a thousand runs, and its report counts their warnings. The results of a study
+    // and of a campaign hold the messages of instances.
     let usual = match arguments.command {
-        Command::Reproduce(_) => "error",
+        Command::Reproduce(_) => "error,fmu_import=off",
         Command::Campaign(_) => "warn,fmu_import=off",
         _ => "warn",
     };

@@ -29,7 +29,7 @@ pub(crate) struct Reproduce {
 /// Runs a study.
 ///
 /// # Errors
-/// Returns an error if the study is faulty, if a run fails, or if a file cannot be written.
+/// Returns an error if the study is faulty, if cases fail, or if a file cannot be written.
 pub(crate) fn reproduce(
     asked: Reproduce,
     out: &mut impl Write,
@@ -43,7 +43,7 @@ pub(crate) fn reproduce(
     if !many.quiet {
         summary(&report, out)?;
     }
-    Ok(())
+    report.failures.map_or(Ok(()), |told| Err(sweep::error::Error::Failed(told).into()))
 }
 
 /// Prints the outcome of a reproduction.

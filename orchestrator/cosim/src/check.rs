@@ -15,6 +15,7 @@ use fmi_master::settings::SettingValue;
 use fmi_master::wiring::Part;
 use fmu_import::faults;
 use fmu_import::fmu::Fmu;
+use fmu_import::folder::from_start;
 use fmu_import::isolation;
 use fmu_import::lookup_table::is_lookup_table;
 use std::fs;
@@ -271,20 +272,24 @@ fn find_fmu(experiment: &Experiment, name: &str, fmu_dirs: &[PathBuf]) -> Result
     folders.dedup();
     folders.extend(fmu_dirs.iter().cloned());
     folders.extend(search::fmu_folders());
-    if let Some(path) =
-        folders.iter().map(|folder| folder.join(written.get_ref())).find(|path| path.is_file())
+    if let Some(path) = folders
+        .iter()
+        .map(|folder| folder.join(written.get_ref()))
+        .find(|path| from_start(path).is_file())
     {
         return Ok(path);
     }
-    if let Some(path) =
-        folders.iter().map(|folder| folder.join(written.get_ref())).find(|path| path.is_dir())
+    if let Some(path) = folders
+        .iter()
+        .map(|folder| folder.join(written.get_ref()))
+        .find(|path| from_start(path).is_dir())
     {
         let problem = format!("{} is a folder, not an archive", path.display());
         return Err(experiment.fmu_error(name, &problem));
     }
     let files: Vec<String> = folders
         .iter()
-        .flat_map(|folder| fs::read_dir(folder).into_iter().flatten().flatten())
+        .flat_map(|folder| fs::read_dir(from_start(folder)).into_iter().flatten().flatten())
         .map(|entry| entry.file_name().to_string_lossy().into_owned())
         .filter(|file| {
             let path = Path::new(file);

@@ -12,6 +12,7 @@
 
 use crate::error::Error;
 use fmi_master::names;
+use fmu_import::folder::from_start;
 use serde::de::DeserializeOwned;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -130,7 +131,8 @@ impl Source {
     pub fn beside(&self, file: &Path) -> PathBuf {
         let mut places = self.folders().map(|folder| folder.join(file));
         let own = places.next().unwrap_or_default();
-        if own.exists() { own } else { places.find(|path| path.exists()).unwrap_or(own) }
+        let is_there = |path: &PathBuf| from_start(path).exists();
+        if is_there(&own) { own } else { places.find(is_there).unwrap_or(own) }
     }
 
     /// Checks that all names are among the `available` ones. The message calls such a name a

@@ -117,7 +117,7 @@ fn component(component: &CheckedComponent, parameters: &Parameters) -> Value {
         .collect();
     json!({
         "fmu": fmu.path.file_name().map(|name| name.to_string_lossy()),
-        "sha256": std::fs::read(&fmu.path).ok().map(digest),
+        "sha256": std::fs::read(fmu_import::folder::from_start(&fmu.path)).ok().map(digest),
         "guid": fmu.description.guid,
         "model": fmu.description.model_name,
         "version": fmu.description.version,

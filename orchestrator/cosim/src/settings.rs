@@ -5,6 +5,7 @@ use crate::experiment::Experiment;
 use fmi_master::description::ModelDescription;
 use fmi_master::settings::Setting;
 use fmi_master::wiring::{Part, Wire};
+use fmu_import::folder::from_start;
 use std::path::Path;
 use toml::Value;
 
@@ -107,6 +108,6 @@ pub(crate) fn is_file(name: &str) -> bool {
 /// such as `vehicle.file` names it. FMUs themselves look for files in the working directory.
 fn file_beside(experiment: &Experiment, name: &str, written: &Value) -> Option<Value> {
     let file = written.as_str().filter(|_| is_file(name))?;
-    let path = std::path::absolute(experiment.source.beside(Path::new(file))).ok()?;
+    let path = from_start(&experiment.source.beside(Path::new(file)));
     Some(Value::from(path.is_file().then_some(path)?.to_str()?))
 }

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::folder::TemporaryFolder;
+use crate::folder::from_start;
 use std::collections::{HashMap, HashSet};
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
@@ -51,7 +52,8 @@ fn unpack_limited(
     normalized: fn(&str) -> String,
 ) -> Result<TemporaryFolder, Error> {
     let refuse = |message: String| Error::Fmu { path: path.to_path_buf(), message };
-    let file = File::open(path).map_err(|source| refuse(format!("cannot be opened: {source}")))?;
+    let file = File::open(from_start(path))
+        .map_err(|source| refuse(format!("cannot be opened: {source}")))?;
     let mut archive = ZipArchive::new(file)
         .map_err(|source| refuse(format!("is not a zip archive: {source}")))?;
     if archive.has_duplicate_names() {
@@ -102,7 +104,7 @@ fn contradiction(path: &Path, place: u64) -> io::Result<Option<String>> {
     /// Length of the fixed part of an entry of the directory, which begins with these bytes.
     const FIXED: usize = 46;
     const BEGIN: &[u8] = b"PK\x01\x02";
-    let mut file = File::open(path)?;
+    let mut file = File::open(from_start(path))?;
     file.seek(SeekFrom::Start(place))?;
     let mut bytes = Vec::new();
     file.read_to_end(&mut bytes)?;

@@ -4,7 +4,7 @@
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Once;
+use std::sync::{LazyLock, Once};
 use std::time::{Duration, SystemTime};
 
 /// Beginning of the names of these folders, which the number of the process follows.
@@ -22,6 +22,13 @@ pub struct TemporaryFolder {
     /// Lock that shows other processes that the folder is in use.
     hold: Option<File>,
     path: PathBuf,
+}
+
+/// Returns where a path leads from the working directory at the first call: a library may change it
+/// while others look for files.
+pub fn from_start(path: &Path) -> PathBuf {
+    static START: LazyLock<PathBuf> = LazyLock::new(|| std::env::current_dir().unwrap_or_default());
+    START.join(path)
 }
 
 /// Removes the folders that killed processes have left. A process does so with its first folder; it

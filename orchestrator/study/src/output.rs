@@ -129,13 +129,24 @@ pub(crate) fn notes(results: &Results) -> Vec<String> {
                 lost.len()
             ));
         }
-        if count > 1 && is_constant(run, result) {
+        if count > 1 && result.failures().is_empty() && is_constant(run, result) {
             let seeds: Vec<&str> = run.seeds.iter().map(|seed| seed.get_ref().as_str()).collect();
             let seeds = seeds.join(" and ");
             notes.push(format!("{id}: {seeds} has no effect, all {count} runs are the same"));
         }
     }
     notes
+}
+
+/// Says which runs have cases that failed, with the first message of each; nothing if none failed.
+pub(crate) fn failures(results: &Results) -> Option<String> {
+    let told = results.pairs().filter_map(|(run, result)| {
+        let failures = result.failures();
+        let (id, count) = (run.id.get_ref(), result.cases());
+        let first = failures.first()?;
+        Some(format!("{id}: {} of {count} cases failed: {first}", failures.len()))
+    });
+    Some(told.collect::<Vec<_>>().join("; ")).filter(|told| !told.is_empty())
 }
 
 /// Returns whether all cases of a run have the same results, apart from computing times.

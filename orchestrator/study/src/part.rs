@@ -2,6 +2,7 @@
 
 use crate::curves::{Curves, Series, bands, widen};
 use crate::definition::Study;
+use crate::results::FAILED;
 use crate::runs::{Run, Within};
 use crate::table::table;
 use cosim::error::Error as Single;
@@ -262,7 +263,17 @@ impl Instances<'_> {
         let mut track: [&mut dyn Observer; 1] = [&mut self.track];
         let seen = if is_drawn { &mut track[..] } else { &mut [] };
         let mut flown = self.flight.fly(case, seen)?;
-        std::mem::replace(&mut flown.outcome, Ok(()))?;
+        match std::mem::replace(&mut flown.outcome, Ok(())) {
+            // An instance refuses the case, which has no numbers. The others are flown.
+            Err(error @ Single::Call { .. }) => {
+                let asked = &mut flown.metrics.asked;
+                for value in asked.values_mut() {
+                    *value = None;
+                }
+                asked.insert(FAILED.into(), Some(Value::Text(error.to_string())));
+            }
+            outcome => outcome?,
+        }
         let Preparation { study, run, .. } = self.preparation;
         for (Within { id, bound, .. }, _) in study.bounds_of(run) {
             let bound = study.number(bound)?;

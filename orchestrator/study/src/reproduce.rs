@@ -6,7 +6,7 @@
 
 use crate::claims;
 use crate::definition::Study;
-use crate::output::{Judgement, Report, notes};
+use crate::output::{Judgement, Report, failures, notes};
 use crate::part::{Bench, Preparation};
 use crate::results::{Results, RunResult};
 use crate::runs::Run;
@@ -35,6 +35,8 @@ pub struct StudyReport {
     pub elapsed: f64,
     /// Remarks on runs whose parameter has no effect or that lose the attitude.
     pub notes: Vec<String>,
+    /// Runs with cases that an instance refused, and why; nothing if there are none.
+    pub failures: Option<String>,
     /// Claims of the study, each with its verdict.
     pub verdicts: Vec<Judgement>,
     /// Names of all files that were written, relative to the folder.
@@ -45,7 +47,7 @@ pub struct StudyReport {
 /// looked for in `fmu_dirs`; `overrides` change all experiments.
 ///
 /// # Errors
-/// Returns an error before anything is run if the study is faulty. It also returns one if an FMU
+/// Returns an error before anything is run if the study is faulty. It also returns one if a library
 /// fails, if a file cannot be written, or if the work was asked to end; the parts that are finished
 /// by then are kept.
 pub fn reproduce(
@@ -114,6 +116,7 @@ pub fn reproduce(
         runs: results.runs.iter().map(RunResult::cases).sum(),
         elapsed: begin.elapsed().as_secs_f64(),
         notes: std::mem::take(&mut work.notes).into_iter().chain(notes(&results)).collect(),
+        failures: failures(&results),
         verdicts: judged.map(|(claim, judged)| (claim.says.clone(), judged.verdict)).collect(),
         files,
     })

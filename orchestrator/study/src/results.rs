@@ -12,6 +12,9 @@ use std::collections::BTreeMap;
 use sweep::parts::PartResult;
 use sweep::table::CaseTable;
 
+/// Column of the messages of cases that an instance refused.
+pub(crate) const FAILED: &str = "failed";
+
 /// Results of one run of the study.
 #[derive(Clone, Debug, Default)]
 pub struct RunResult {
@@ -43,6 +46,12 @@ impl RunResult {
     /// Returns the number of cases.
     pub fn cases(&self) -> usize {
         self.parts.iter().map(CaseTable::rows).sum()
+    }
+
+    /// Returns why cases failed, in order.
+    pub(crate) fn failures(&self) -> Vec<&String> {
+        let told = self.parts.iter().flat_map(|part| part.texts(FAILED));
+        told.filter(|message| !message.is_empty()).collect()
     }
 
     /// Returns the column with this name: the number of each case, or `None` where it is missing.

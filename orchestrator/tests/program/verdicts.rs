@@ -144,3 +144,37 @@ claim = [
         text.contains("Of 4 claims, 1 holds, 1 holds in part, 1 does not hold, 1 is not judged.")
     );
 }
+
+#[test]
+fn a_study_flies_on_where_a_case_fails_and_says_so_once() {
+    let bench = Bench::new();
+    let study = r##"
+title = "gains"
+paper = "-"
+summary = "-"
+values = []
+run = [
+    { id = "a", label = "a", color = "#000000", experiment = "loop.toml", measures = ["last"], set = { "plant.fail.time" = 0.5 } },
+    { id = "b", label = "b", color = "#000000", experiment = "loop.toml", measures = ["last"] },
+]
+signals.out = ["plant.output.integral"]
+measure = [{ id = "last", kind = "last", signals = "out" }]
+claim = [
+    { says = "It ends above zero.", source = "-", check = [{ label = "a", relation = "above", left = "a.measure.last", right = 0.0 }] },
+    { says = "So does the other.", source = "-", check = [{ label = "b", relation = "above", left = "b.measure.last", right = 0.0 }] },
+]
+figure = [{ id = "f", title = "f", caption = "-", runs = ["a", "b"], panel = [{ label = "out", signal = "plant.output.integral" }] }]
+"##;
+    fs::write(bench.path("study.toml"), study).unwrap();
+    let (code, said, errors) =
+        bench.call(&["reproduce", "study.toml", "--out", "s", "--fmu-dir", "."]);
+    assert_eq!((code, errors.matches("trouble").count()), (1, 0), "{errors}");
+    assert_eq!(
+        errors.matches("a: 1 of 1 cases failed: plant failed at t = ").count(),
+        1,
+        "{errors}"
+    );
+    assert!(said.contains("not judged     It ends above zero."), "{said}");
+    assert!(said.contains("holds          So does the other."), "{said}");
+    assert!(bench.text("s/report.html").contains("a: 1 of 1 cases failed: plant failed"));
+}

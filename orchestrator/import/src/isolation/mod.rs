@@ -105,7 +105,7 @@ impl Ended {
 /// Returns whether this system can close a process.
 pub fn can_close() -> bool {
     #[cfg(target_os = "linux")]
-    return sandbox::is_there();
+    return closed::is_there();
     #[cfg(not(target_os = "linux"))]
     return false;
 }

@@ -42,11 +42,6 @@ const READABLE: [&str; 18] = [
     "/sys/devices/system/cpu",
 ];
 
-/// Returns whether the system has Landlock.
-pub(super) fn is_there() -> bool {
-    rules().and_then(Ruleset::create).is_ok()
-}
-
 /// Closes everything but `home` and what `closing` names to this thread and to those that it
 /// starts.
 ///
