@@ -102,13 +102,6 @@ pub(crate) enum Command {
         #[arg(value_enum)]
         kind: schema::FileKind,
     },
-    /// Write a script that completes commands and options in a shell, for example `orchestrator
-    /// completions bash`.
-    #[command(hide = true)]
-    Completions {
-        /// Shell that the script is for.
-        shell: clap_complete::Shell,
-    },
     /// List experiments, studies, campaigns and FMUs by the names that the other commands take.
     List {
         /// Folder to search [default: those beside the program and in ORCHESTRATOR_PATH].

@@ -22,7 +22,7 @@ mod schema;
 mod show;
 mod summary;
 
-use command_line::{Command, definition};
+use command_line::Command;
 use cosim::interrupt::Interrupt;
 use failure::Failure;
 use fmu_import::crash;
@@ -110,10 +110,6 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         Command::Inspect(asked) => inspect::run(&asked, out),
         Command::Show { name } => show::show(&name, out),
         Command::Schema { kind } => Ok(out.write_all(schema::text(kind).as_bytes())?),
-        Command::Completions { shell } => {
-            clap_complete::generate(shell, &mut definition(), "orchestrator", out);
-            Ok(())
-        }
         Command::List { folder, json } => list::list(folder.as_deref(), json, out),
     }
 }

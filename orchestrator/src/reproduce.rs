@@ -67,5 +67,5 @@ fn summary(report: &StudyReport, out: &mut impl Write) -> io::Result<()> {
         writeln!(out, "  {:<14} {claim}", verdict.text())?;
     }
     writeln!(out, "  report: {}", report.page.display())?;
-    writeln!(out, "  in the same folder: {}", report.files[1..].join("; "))
+    writeln!(out, "  in the same folder: results.json, and the figures in figures")
 }

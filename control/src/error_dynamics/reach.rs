@@ -94,7 +94,6 @@ pub struct InitialTicks {
 impl InitialTicks {
     /// Counts the larger effects in sums over 0, 1, … ticks, of which the first ticks are the
     /// oldest parts.
-    #[must_use]
     pub fn count(&self, sums: &[Reach]) -> Vec<Reach> {
         let oldest = |n: usize| sums[n].minus(&sums[n - n.min(self.ticks)]);
         (0..sums.len()).map(|n| sums[n].plus(&oldest(n).times(self.excess))).collect()

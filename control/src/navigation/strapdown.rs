@@ -56,7 +56,6 @@ impl State {
     /// Returns the state after `elapsed` (s), in which the readings change linearly, and the change
     /// of the velocity by the specific force (m/s). The rotation vector of a linear rate has the
     /// coning term (T²/12) ω₀ × ω₁.
-    #[must_use]
     pub(super) fn after(
         &self,
         planet: &Planet,

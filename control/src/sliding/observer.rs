@@ -41,7 +41,6 @@ impl Observer {
     /// Returns the state (24) after `period` (s) by Euler's rule, with ṡ = `drive` + Δv,
     /// `drive` = v − b, and s = `sliding` at the beginning. A change of `drive` affects z₀ first,
     /// and z₁ one step later.
-    #[must_use]
     pub fn advance(
         &self,
         estimate: &Estimate,

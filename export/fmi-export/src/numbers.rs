@@ -14,7 +14,6 @@ fn holds_numbers(value: &Value) -> bool {
         Value::Float(number) => !number.is_nan(),
         Value::Array(items) => items.iter().all(holds_numbers),
         Value::Map(entries) => entries.iter().all(|(_, value)| holds_numbers(value)),
-        Value::Tag(_, value) => holds_numbers(value),
         _ => true,
     }
 }

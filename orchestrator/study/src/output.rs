@@ -45,22 +45,18 @@ impl Report {
         })
     }
 
-    /// Writes the figures, the numbers and the page. Returns the names of the files.
+    /// Writes the figures, the numbers and the page.
     ///
     /// # Errors
     /// Returns an error if a file cannot be written.
-    pub(crate) fn write(&self, results: &Results, out: &Path) -> Result<Vec<String>, Error> {
-        let mut files = vec!["report.html".to_string(), "results.json".to_string()];
+    pub(crate) fn write(&self, results: &Results, out: &Path) -> Result<(), Error> {
         for (Figure { id, .. }, drawn) in results.study.figures.iter().zip(&self.figures) {
-            let name = format!("figures/{id}.svg");
-            svg::write(drawn, &out.join(&name))?;
-            files.push(name);
+            svg::write(drawn, &out.join(format!("figures/{id}.svg")))?;
         }
         files::write(&out.join("results.json"), numbers(results, &self.judged))?;
         let origin = origin::origin();
         let page = page::page(results, &self.judged, &self.figures, &self.tables, &origin);
-        files::write(&out.join("report.html"), page)?;
-        Ok(files)
+        files::write(&out.join("report.html"), page)
     }
 }
 

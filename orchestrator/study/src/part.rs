@@ -267,9 +267,7 @@ impl Instances<'_> {
             // An instance refuses the case, which has no numbers. The others are flown.
             Err(error @ Single::Call { .. }) => {
                 let asked = &mut flown.metrics.asked;
-                for value in asked.values_mut() {
-                    *value = None;
-                }
+                *asked = asked.keys().map(|name| (name.clone(), None)).collect();
                 asked.insert(FAILED.into(), Some(Value::Text(error.to_string())));
             }
             outcome => outcome?,

@@ -39,8 +39,6 @@ pub struct StudyReport {
     pub failures: Option<String>,
     /// Claims of the study, each with its verdict.
     pub verdicts: Vec<Judgement>,
-    /// Names of all files that were written, relative to the folder.
-    pub files: Vec<String>,
 }
 
 /// Runs those parts of a study that are not finished yet, and writes its report. FMUs are also
@@ -107,7 +105,7 @@ pub fn reproduce(
     }
     let results = Results { study, runs };
     let report = Report::new(&results).map_err(|message| study.fault(message))?;
-    let files = report.write(&results, &out)?;
+    report.write(&results, &out)?;
     let judged = study.claims.iter().zip(report.judged);
     Ok(StudyReport {
         title: study.title.clone(),
@@ -118,7 +116,6 @@ pub fn reproduce(
         notes: std::mem::take(&mut work.notes).into_iter().chain(notes(&results)).collect(),
         failures: failures(&results),
         verdicts: judged.map(|(claim, judged)| (claim.says.clone(), judged.verdict)).collect(),
-        files,
     })
 }
 
