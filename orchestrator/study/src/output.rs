@@ -134,17 +134,6 @@ pub(crate) fn notes(results: &Results) -> Vec<String> {
     notes
 }
 
-/// Says which runs have cases that failed, with the first message of each; nothing if none failed.
-pub(crate) fn failures(results: &Results) -> Option<String> {
-    let told = results.pairs().filter_map(|(run, result)| {
-        let failures = result.failures();
-        let (id, count) = (run.id.get_ref(), result.cases());
-        let first = failures.first()?;
-        Some(format!("{id}: {} of {count} cases failed: {first}", failures.len()))
-    });
-    Some(told.collect::<Vec<_>>().join("; ")).filter(|told| !told.is_empty())
-}
-
 /// Returns whether all cases of a run have the same results, apart from computing times.
 fn is_constant(run: &Run, result: &RunResult) -> bool {
     let metrics = run.observe.metrics.iter().filter(|(_, measure)| !measure.timing);

@@ -8,7 +8,6 @@ use crate::claims::{Judged, Verdict};
 use crate::comparisons::Overview;
 use crate::definition::Study;
 use crate::drawings::Figure;
-use crate::output::failures;
 use crate::results::{Results, RunResult};
 use cosim_report::figure::{self, svg};
 use cosim_report::page::{Page, Section, folded, paragraphs, table};
@@ -38,7 +37,7 @@ pub(crate) fn page(
     };
     let about = paragraphs(&study.summary);
     let quickly = quickly(study).map(|quickly| format!(" This is {quickly}."));
-    let failed = failures(results).map(|told| format!(" {told}."));
+    let failed = results.failures().map(|told| format!(" {told}."));
     let told = answer(judged) + &quickly.unwrap_or_default() + &failed.unwrap_or_default();
     let claims = Section {
         class: Some("claims"),

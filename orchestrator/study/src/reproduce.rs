@@ -6,7 +6,7 @@
 
 use crate::claims;
 use crate::definition::Study;
-use crate::output::{Judgement, Report, failures, notes};
+use crate::output::{Judgement, Report, notes};
 use crate::part::{Bench, Preparation};
 use crate::results::{Results, RunResult};
 use crate::runs::Run;
@@ -114,7 +114,7 @@ pub fn reproduce(
         runs: results.runs.iter().map(RunResult::cases).sum(),
         elapsed: begin.elapsed().as_secs_f64(),
         notes: std::mem::take(&mut work.notes).into_iter().chain(notes(&results)).collect(),
-        failures: failures(&results),
+        failures: results.failures(),
         verdicts: judged.map(|(claim, judged)| (claim.says.clone(), judged.verdict)).collect(),
     })
 }

@@ -199,6 +199,18 @@ impl<'a> Results<'a> {
         self.pairs().find(|(run, _)| run.id.get_ref() == id).map(|(_, result)| result)
     }
 
+    /// Says which runs have cases that failed, with the first message of each; nothing if none
+    /// failed.
+    pub(crate) fn failures(&self) -> Option<String> {
+        let told = self.pairs().filter_map(|(run, result)| {
+            let failures = result.failures();
+            let (id, count) = (run.id.get_ref(), result.cases());
+            let first = failures.first()?;
+            Some(format!("{id}: {} of {count} cases failed: {first}", failures.len()))
+        });
+        Some(told.collect::<Vec<_>>().join("; ")).filter(|told| !told.is_empty())
+    }
+
     /// Returns the numbers that `run.metric` refers to. There are none if the run has no such
     /// quantity.
     ///
