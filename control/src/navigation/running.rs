@@ -31,10 +31,10 @@ const STILL: u32 = 5;
 /// Time since the last sample from which the motion counts as unseen and the navigation as lost,
 /// and a clock that lags is not believed, s.
 pub(super) const UNSEEN_AFTER: f64 = 0.5;
-/// Specific force from which fixes of the motion show the attitude, m/s², and the share of the time
-/// before that each leaves in doubt.
+/// Specific force from which fixes of the motion show the attitude, m/s², and the time in which they
+/// do, s, however many come.
 const SHOWING: f64 = 1.0;
-const DOUBTED: f64 = 0.8;
+const SHOWN_IN: f64 = 5.0;
 
 /// State once a sample has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -341,15 +341,17 @@ impl Navigation {
         source: Source,
     ) {
         let now = running.last.time;
+        let shows = running.last.force.norm() >= SHOWING;
+        // A gap counts as a second.
+        let elapsed = (now - running.fixed).min(1.0);
+        running.turning *= match source {
+            Source::Star => 0.0,
+            Source::Gnss if shows => exp(-elapsed / SHOWN_IN),
+            _ => 1.0,
+        };
         if matches!(source, Source::Gnss | Source::Star) {
             running.fixed = now;
         }
-        let shows = running.last.force.norm() >= SHOWING;
-        running.turning *= match source {
-            Source::Star => 0.0,
-            Source::Gnss if shows => DOUBTED,
-            _ => 1.0,
-        };
         running.covariance = *covariance;
         running.state.correct(error, 0.0);
         running.history.correct(error, now);
