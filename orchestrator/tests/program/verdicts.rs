@@ -103,16 +103,20 @@ fn a_search_says_whether_the_worst_case_breaks_a_limit() {
     }
 }
 
-#[test]
-fn a_study_says_of_each_claim_whether_it_holds() {
-    let bench = Bench::new();
-    let study = r##"
+/// Beginning of a study.
+const HEAD: &str = r#"
 title = "gains"
 paper = "-"
 summary = "-"
 values = []
-run = [{ id = "a", label = "a", color = "#000000", experiment = "loop.toml", measures = ["last", "never"], set = { "gain.gain" = 1.0 } }]
 signals.out = ["plant.output.integral"]
+"#;
+
+#[test]
+fn a_study_says_of_each_claim_whether_it_holds() {
+    let bench = Bench::new();
+    let study = r##"
+run = [{ id = "a", label = "a", color = "#000000", experiment = "loop.toml", measures = ["last", "never"], set = { "gain.gain" = 1.0 } }]
 measure = [
     { id = "last", kind = "last", signals = "out" },
     { id = "never", kind = "leaving", signals = "out", bound = 1e9 },
@@ -127,7 +131,7 @@ claim = [
     { says = "It leaves late.", source = "-", check = [{ label = "time", left = "a.measure.never", right = 9.0 }] },
 ]
 "##;
-    fs::write(bench.path("study.toml"), study).unwrap();
+    fs::write(bench.path("study.toml"), format!("{HEAD}{study}")).unwrap();
     let said = bench.says(&["reproduce", "study.toml", "--out", "s", "--fmu-dir", "."]);
     let text = bench.text("s/report.html");
     for (verdict, class, claim) in [
@@ -149,15 +153,10 @@ claim = [
 fn a_study_flies_on_where_a_case_fails_and_says_so_once() {
     let bench = Bench::new();
     let study = r##"
-title = "gains"
-paper = "-"
-summary = "-"
-values = []
 run = [
     { id = "a", label = "a", color = "#000000", experiment = "loop.toml", measures = ["last"], set = { "plant.fail.time" = 0.5 } },
     { id = "b", label = "b", color = "#000000", experiment = "loop.toml", measures = ["last"] },
 ]
-signals.out = ["plant.output.integral"]
 measure = [{ id = "last", kind = "last", signals = "out" }]
 claim = [
     { says = "It ends above zero.", source = "-", check = [{ label = "a", relation = "above", left = "a.measure.last", right = 0.0 }] },
@@ -165,7 +164,7 @@ claim = [
 ]
 figure = [{ id = "f", title = "f", caption = "-", runs = ["a", "b"], panel = [{ label = "out", signal = "plant.output.integral" }] }]
 "##;
-    fs::write(bench.path("study.toml"), study).unwrap();
+    fs::write(bench.path("study.toml"), format!("{HEAD}{study}")).unwrap();
     let (code, said, errors) =
         bench.call(&["reproduce", "study.toml", "--out", "s", "--fmu-dir", "."]);
     assert_eq!((code, errors.matches("trouble").count()), (1, 0), "{errors}");
