@@ -314,7 +314,8 @@ def test_a_changed_measure_is_computed_again(tmp_path, key, other):
         ("exchange", 'runs = ["*"]', 'runs = ["chai-alocated-*"]', "chai-alocated-*"),
         ("exchange", "set_for.dlmpc", "set_for.dlmp", 'did you mean "dlmpc"'),
         ("exchange", 'of = "step_us.controller"', 'of = "step_s.controller"', "step_s.controller"),
-        ("exchange", "hold = 2.0", "hold = -2.0", "hold"),
+        ("exchange", "100 * guarantee_share", "1OO * guarantee_share", "no factor"),
+        ("two-loop-smc", "± reach.roll", "± reach.rol", "reach.rol"),
         ("exchange", 'experiment = "tvsmc-2015-allocated.toml"', 'experiment = "tvsmc-allocated.toml"', "tvsmc-allocated"),
     ],
 )

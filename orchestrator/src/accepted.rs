@@ -167,6 +167,9 @@ impl Questions {
             changes: changes.clone(),
             leaving: None,
         });
+        // What refuses the settings as they are says so in its own words.
+        as_set.start()?;
+        let _silence = warnings::silence();
         let mut rows = Vec::new();
         let mut add = |answer: String, shown: &Resolved, set, ask: &Ask| {
             let (as_set, by_rule) = (ask(&as_set)?, ask(&by_rule)?);
@@ -220,10 +223,7 @@ pub(crate) fn answers(
 ) -> Result<Vec<Row>, Error> {
     let fault = |problem| Error::experiment(format!("[observe.guarantee.accepted] {problem}"));
     let questions = Questions::find(system, asked).map_err(fault)?;
-    system.apart(interrupt, || {
-        let _silence = warnings::silence();
-        questions.answers(system, interrupt)
-    })
+    system.apart(interrupt, || questions.answers(system, interrupt))
 }
 
 /// Writes the answers as a table.

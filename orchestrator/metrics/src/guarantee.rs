@@ -102,24 +102,27 @@ impl GuaranteeSignals {
             }
         }
         let observe = system.experiment.observe.clone();
+        for signal in guarantee.assumes.as_ref().map_or(Ok(&[][..]), |name| observe.list(name))? {
+            if !signal.paths().iter().any(|path| is_left_out(path, system)) {
+                signals.assumes.push((signal.clone().into(), system.resolve(signal)?));
+            }
+        }
         let mut of_list = |name: &Option<String>| {
             let mut found = Vec::new();
             for signal in name.as_ref().map_or(Ok(&[][..]), |name| observe.list(name))? {
                 if !system.lost_by_exchange(signal.paths()) {
-                    found.push((signal.clone().into(), system.resolve(signal)?));
+                    found.push(system.resolve(signal)?);
                 }
             }
             Ok::<_, String>(found)
         };
-        signals.keeps = of_list(&guarantee.keeps)?.into_iter().map(|(_, signal)| signal).collect();
-        signals.assumes = of_list(&guarantee.assumes)?;
+        signals.keeps = of_list(&guarantee.keeps)?;
         let way = of_list(&guarantee.late.as_ref().map(|late| late.signals.clone()))?;
         if let Some(Late { beyond, time, .. }) = &guarantee.late
             && !is_left_out(time, system)
         {
-            let signals_of_way = way.into_iter().map(|(_, signal)| signal).collect();
             let time = system.probe(time)?.place;
-            signals.late = Some(LateSignals { signals: signals_of_way, beyond: *beyond, time });
+            signals.late = Some(LateSignals { signals: way, beyond: *beyond, time });
         }
         Ok(Some(signals))
     }

@@ -13,6 +13,9 @@ pub(crate) fn larger(a: f64, b: f64) -> f64 {
     if b > a || b.is_nan() { b } else { a }
 }
 
+/// Share of the observed time at whose end signals that have settled are seen within their band.
+const SETTLED: f64 = 0.1;
+
 /// Tolerance with which a bound counts as met, because of rounding.
 const ROUNDING: f64 = 1e-9;
 
@@ -108,8 +111,9 @@ impl Gauge {
             }
             Quantity::Largest => Some(factor * self.seen.largest),
             Quantity::Last => self.seen.before.first().map(|value| factor * value),
-            Quantity::Settling { hold, .. } => {
-                self.seen.settled.filter(|settled| self.seen.last - settled >= hold)
+            Quantity::Settling { .. } => {
+                let least = SETTLED * (self.seen.last - self.seen.began);
+                self.seen.settled.filter(|settled| self.seen.last - settled >= least)
             }
             Quantity::Pulses => Some(self.seen.pulses as f64),
             Quantity::Leaving { .. } => self.seen.left,

@@ -1,6 +1,6 @@
 //! The part of a study that describes its tables, its overviews and its claims.
 
-use crate::values::Quantity;
+use crate::values::{Quantity, ShownMetric};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
@@ -54,15 +54,10 @@ pub struct Overview {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OverviewColumn {
-    /// Name of the metric, which is shown for each run.
-    #[serde(rename = "of")]
-    pub metric: String,
+    /// Metric that is shown for each run, in the unit of the heading.
+    pub of: ShownMetric,
     /// Heading of the column, with the unit.
     pub label: String,
-    /// Factor by which the metric is multiplied to get the unit of the heading. Parameters are in
-    /// the units of the FMU's variables.
-    #[serde(default = "crate::values::unscaled")]
-    pub factor: f64,
     /// Limit in the unit of the heading; larger values are marked.
     pub limit: Option<f64>,
 }

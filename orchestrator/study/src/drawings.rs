@@ -1,6 +1,6 @@
 //! The part of a study that describes its figures.
 
-use crate::values::Quantity;
+use crate::values::{Quantity, ShownMetric, Values};
 use cosim::experiment::Scaled;
 use cosim::signal::Signal;
 use cosim_report::figure::Color;
@@ -66,9 +66,6 @@ pub struct Panel {
     /// Frequency response of the loop that `[observe.margins]` linearises, as one curve for each
     /// run.
     pub response: Option<Response>,
-    /// Radius of a disk margin, below 2, whose excluded set a panel with `response = "nichols"`
-    /// shows.
-    pub disk: Option<f64>,
     /// Horizontal lines across the panel.
     #[serde(default)]
     pub bounds: Vec<Line>,
@@ -137,7 +134,8 @@ pub struct Curve {
 #[serde(rename_all = "kebab-case")]
 pub enum Response {
     /// Magnitude of the return ratio, in dB, over its phase in deg: at the signal with the smallest
-    /// disk margin, while the loops of the others are closed.
+    /// disk margin, while the loops of the others are closed. A line surrounds what a disk margin of
+    /// 1 excludes.
     Nichols,
     /// Largest singular value of the sensitivity of all signals, in dB, over the frequency in
     /// rad/s.
@@ -148,26 +146,14 @@ pub enum Response {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Across {
-    /// Metric along the horizontal axis, with its factor.
-    pub x: Axis,
-    /// Metric along the vertical axis, with its factor.
-    pub y: Axis,
+    /// Metric along the horizontal axis.
+    pub x: ShownMetric,
+    /// Metric along the vertical axis.
+    pub y: ShownMetric,
     /// Lines that are drawn, each through runs of its own. Without any, each case of the panel's
     /// runs is a dot.
     #[serde(default)]
     pub lines: Vec<Through>,
-}
-
-/// A metric along an axis, with its factor.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Axis {
-    /// Name of the metric along the axis.
-    #[serde(rename = "of")]
-    pub metric: String,
-    /// Factor by which the metric is multiplied to get the unit of the axis.
-    #[serde(default = "crate::values::unscaled")]
-    pub factor: f64,
 }
 
 /// A line through several runs. Each of its points is the mean of a run's metrics.
@@ -187,11 +173,22 @@ pub struct Through {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Line {
-    /// Position of the line: a number, or the id of a value.
+    /// Position of the line: a number, or the id of a value. With `± ` before it there is a second
+    /// line at the negative position.
     pub at: Quantity,
     /// Name of the line, which stands beside it.
     pub label: String,
-    /// Whether a second line is drawn at the negative position.
-    #[serde(default)]
-    pub symmetric: bool,
+}
+
+impl Line {
+    /// Returns the positions of the line.
+    ///
+    /// # Errors
+    /// Returns an error that names the id if there is no such value.
+    pub fn positions(&self, values: &Values) -> Result<Vec<f64>, String> {
+        let Quantity::Named(text) = &self.at else { return Ok(vec![values.number(&self.at)?]) };
+        let Some(text) = text.strip_prefix("± ") else { return Ok(vec![values.number(&self.at)?]) };
+        let at = text.parse().map_or_else(|_| values.number(&Quantity::Named(text.into())), Ok)?;
+        Ok(vec![at, -at])
+    }
 }

@@ -1,11 +1,13 @@
 //! Draws the figures of a study from the results of its runs.
 
-use crate::drawings::{Across, Axis, Drawn, Figure, Line, Panel, Response, Through};
+use crate::drawings::{Across, Drawn, Figure, Line, Panel, Response, Through};
 use crate::results::{Results, RunResult};
 use crate::runs::Run;
+use crate::values::ShownMetric;
 use cosim::signal::Signal;
 use cosim_report::figure::{self, Color, Curve, Shape};
 use linear::curves::{ResponseCurves, excluded};
+use std::iter;
 use toml::Spanned;
 
 /// A run whose curves a panel shows, with its results.
@@ -32,7 +34,7 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
             (across.x.metric.as_str(), scattered(across, &runs, results)?)
         }
         Drawn::Across(across) => (across.x.metric.as_str(), lines_across(across, results)?),
-        Drawn::Response(Response::Nichols) => ("phase of L, deg", nichols(panel.disk, &runs)),
+        Drawn::Response(Response::Nichols) => ("phase of L, deg", nichols(&runs)),
         Drawn::Response(Response::Sensitivity) => ("frequency, rad/s", sensitivities(&runs)),
     };
     curves.extend(straight_lines(panel, results)?);
@@ -95,7 +97,7 @@ fn signals<'a>(panel: &'a Panel, run: &'a Run) -> Vec<(&'a Signal, &'a str, Colo
 /// Draws each case of a run as a dot.
 fn scattered(across: &Across, runs: &[Shown], results: &Results) -> Result<Vec<Curve>, String> {
     let dots = |(run, _): &Shown| {
-        let numbers = |Axis { metric, factor }: &Axis| {
+        let numbers = |ShownMetric { metric, factor }: &ShownMetric| {
             let numbers = results.numbers(&format!("{}.{metric}", run.id.get_ref()))?.0;
             Ok::<_, String>(numbers.into_iter().map(|number| number * factor).collect())
         };
@@ -106,7 +108,7 @@ fn scattered(across: &Across, runs: &[Shown], results: &Results) -> Result<Vec<C
 
 /// Draws lines through the means of several runs.
 fn lines_across(across: &Across, results: &Results) -> Result<Vec<Curve>, String> {
-    let means = |line: &Through, axis: &Axis| {
+    let means = |line: &Through, axis: &ShownMetric| {
         let mean = |run: &Spanned<String>| {
             let numbers = results.numbers(&format!("{}.{}", run.get_ref(), axis.metric))?;
             // A run without this metric leaves a gap.
@@ -130,13 +132,11 @@ fn responses(runs: &[Shown], xy: fn(&ResponseCurves) -> (&Vec<f64>, &Vec<f64>)) 
     runs.iter().filter_map(curve).collect()
 }
 
-/// Draws return ratios, with the set that a disk margin excludes.
-fn nichols(disk: Option<f64>, runs: &[Shown]) -> Vec<Curve> {
-    let limit = disk.map(|alpha| {
-        let (x, y) = excluded(alpha);
-        Curve::new(&format!("disk margin {alpha}"), Color::LIMIT, Shape::Dashed, x, y)
-    });
-    limit.into_iter().chain(responses(runs, |curves| (&curves.phase, &curves.gain))).collect()
+/// Draws return ratios, with the set that a disk margin of 1 excludes.
+fn nichols(runs: &[Shown]) -> Vec<Curve> {
+    let (x, y) = excluded(1.0);
+    let limit = Curve::new("disk margin 1", Color::LIMIT, Shape::Dashed, x, y);
+    iter::once(limit).chain(responses(runs, |curves| (&curves.phase, &curves.gain))).collect()
 }
 
 fn sensitivities(runs: &[Shown]) -> Vec<Curve> {
@@ -147,9 +147,8 @@ fn sensitivities(runs: &[Shown]) -> Vec<Curve> {
 fn straight_lines(panel: &Panel, results: &Results) -> Result<Vec<Curve>, String> {
     let mut curves = Vec::new();
     let mut draw = |line: &Line, shape: &Shape, place: fn(f64) -> (f64, f64)| {
-        let at = results.study.values.number(&line.at)?;
-        for side in [at, -at].into_iter().take(if line.symmetric { 2 } else { 1 }) {
-            let (x, y) = place(side);
+        for at in line.positions(&results.study.values)? {
+            let (x, y) = place(at);
             curves.push(Curve::new(&line.label, Color::LIMIT, shape.clone(), vec![x], vec![y]));
         }
         Ok::<_, String>(())

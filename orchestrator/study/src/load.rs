@@ -178,11 +178,8 @@ impl Study {
                 "response needs [observe.margins], which the experiment of the run \"{id}\" does not have"
             ));
         }
-        if panel.disk.is_some_and(|alpha| !(alpha > 0.0 && alpha < 2.0)) {
-            return Err("disk must lie between 0 and 2".into());
-        }
         let mut lines = panel.bounds.iter().chain(&panel.marks);
-        lines.try_for_each(|line| self.values.number(&line.at).map(drop))
+        lines.try_for_each(|line| line.positions(&self.values).map(drop))
     }
 }
 

@@ -135,7 +135,7 @@ fn check(study: &Study) -> Result<(), String> {
         for column in &overview.metrics {
             // One run with this metric is enough; the other rows stay empty.
             let numbers = |run: &Spanned<String>| {
-                results.numbers(&format!("{}.{}", run.get_ref(), column.metric))
+                results.numbers(&format!("{}.{}", run.get_ref(), column.of.metric))
             };
             let mut numbers = overview.runs.iter().map(numbers);
             if let Some(first) = numbers.next()

@@ -69,9 +69,30 @@ pub enum Quantity {
 #[derive(Clone, Debug, Default)]
 pub struct Values(pub Vec<Entry>);
 
-/// Returns the factor of a number that is shown in its own unit.
-pub(crate) fn unscaled() -> f64 {
-    1.0
+/// A metric, as `NAME`, or with the factor that gives it the unit of what it is shown with, as
+/// `FACTOR * NAME`. Parameters are in the units of the FMU's variables.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(try_from = "String")]
+#[schemars(with = "String")]
+pub struct ShownMetric {
+    /// Name of the metric.
+    pub metric: String,
+    /// Factor of the metric.
+    pub factor: f64,
+}
+
+impl TryFrom<String> for ShownMetric {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        let Some((factor, metric)) = text.split_once(" * ") else {
+            return Ok(Self { metric: text, factor: 1.0 });
+        };
+        match factor.parse::<f64>() {
+            Ok(factor) if factor.is_finite() => Ok(Self { metric: metric.into(), factor }),
+            _ => Err(format!("\"{factor}\" is no factor: write \"NAME\" or \"100 * NAME\"")),
+        }
+    }
 }
 
 impl Values {

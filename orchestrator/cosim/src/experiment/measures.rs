@@ -118,10 +118,6 @@ pub struct Measure {
     pub timing: bool,
     /// For `settling`, the width of the band as a fraction of a signal's first magnitude.
     pub band: Option<f64>,
-    /// For `settling`, the shortest time for which the signals must have been observed within the
-    /// band, s.
-    #[serde(default)]
-    pub hold: f64,
     /// For `leaving`, the magnitude that a signal must exceed. For `settling`, in place of `band`,
     /// the magnitude within which every signal must stay. For `rises`, the least rise that counts.
     /// For `share`, the magnitude within which all signals must lie.
@@ -148,7 +144,7 @@ pub enum MeasureKind {
     /// Last value of the first signal.
     Last,
     /// Time from which on every signal stays within `band` times its first magnitude, or within
-    /// `bound`, s. There is no value if a signal never does.
+    /// `bound`, s. There is no value if a signal is not seen to do so for a tenth of the time.
     Settling,
     /// Number of times that any signal rises above one half.
     Pulses,
@@ -201,7 +197,7 @@ pub struct Guarantee {
     /// Group of variables that show the plan that is followed, for the page of a run: `began`, and
     /// `time`, `rate`, `rateBound`, `moment` and `momentBound` with an index.
     pub plan: Option<String>,
-    /// Whether the FMUs may lack `in_force`, `status` and the margins.
+    /// Whether the FMUs may lack `in_force`, `status`, the margins and signals that `assumes` needs.
     #[serde(default)]
     pub optional: bool,
 }
@@ -364,7 +360,6 @@ impl Measure {
             optional: false,
             timing: false,
             band: None,
-            hold: 0.0,
             bound: None,
             frequency: None,
         }

@@ -21,8 +21,6 @@ pub enum Quantity {
     Settling {
         /// Band of the signals.
         within: Band,
-        /// Shortest time for which they must have been observed within the band, s.
-        hold: f64,
     },
     /// Number of times that any signal rises above one half.
     Pulses,
@@ -79,14 +77,13 @@ impl Measure {
         let takes: &[&str] = match self.kind {
             MeasureKind::Pulses => &[],
             MeasureKind::Rises | MeasureKind::Leaving | MeasureKind::Share => &["bound"],
-            MeasureKind::Settling => &["bound", "band", "hold"],
+            MeasureKind::Settling => &["bound", "band"],
             MeasureKind::RmsAbove => &["unit", "frequency"],
             _ => &["unit"],
         };
         let given = [
             ("bound", self.bound.is_some()),
             ("band", self.band.is_some()),
-            ("hold", self.hold != 0.0),
             ("frequency", self.frequency.is_some_and(|frequency| frequency > 0.0)),
             ("unit", self.unit.is_some()),
         ];
@@ -113,10 +110,8 @@ impl Measure {
                     (None, Some(bound)) if bound > 0.0 => Some(Band::Absolute(bound)),
                     _ => None,
                 };
-                let within = within.filter(|_| self.hold >= 0.0).ok_or(
-                    "settling needs either a band or a bound above 0, and a hold of at least 0",
-                )?;
-                Quantity::Settling { within, hold: self.hold }
+                let within = within.ok_or("settling needs either a band or a bound above 0")?;
+                Quantity::Settling { within }
             }
             (MeasureKind::RmsAbove, _) => match self.frequency {
                 Some(frequency) if frequency > 0.0 => Quantity::RmsAbove { frequency },

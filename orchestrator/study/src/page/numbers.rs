@@ -80,9 +80,9 @@ fn rows(
     for id in &overview.runs {
         let Some(run) = results.study.run(id.get_ref()) else { continue };
         let numbers = overview.metrics.iter().map(|column| {
-            let reference = format!("{}.{}", id.get_ref(), column.metric);
+            let reference = format!("{}.{}", id.get_ref(), column.of.metric);
             let numbers = results.numbers(&reference).into_iter().flat_map(|numbers| numbers.0);
-            Numbers(numbers.map(|number| number * column.factor).collect())
+            Numbers(numbers.map(|number| number * column.of.factor).collect())
         });
         rows.push((run, numbers.collect::<Vec<_>>()));
     }
