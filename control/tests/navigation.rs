@@ -140,7 +140,7 @@ fn oracle_a_late_fix_is_applied_at_its_own_time() {
 /// the shown errors larger than five of their deviations.
 #[test]
 fn faults_are_survived_and_said() {
-    use FaultKind::{Clock, Dropout, Frozen, Position, Restart, Velocity};
+    use FaultKind::{Accelerometer, Clock, Dropout, Frozen, Position, Restart, Velocity};
     let cases = [
         // Device, fault, size, window, most error of an angle (deg) and of the position at the end (m).
         (0, Velocity, 10.0, [0.0, 0.02], 0.4, 10.0),
@@ -149,11 +149,13 @@ fn faults_are_survived_and_said() {
         (0, Position, 1.0, [120.0, FOR_EVER], 0.4, 900.0),
         (0, Frozen, 1.0, [1540.0, 1570.0], 0.4, 10.0),
         (0, Clock, -1.0, [0.0, FOR_EVER], 0.4, 100.0),
+        (0, Clock, 1.0, [100.0, 400.0], 0.4, 10.0),
         (0, Restart, 1.0, [130.0, FOR_EVER], 0.4, 10.0),
         (1, FaultKind::Attitude, 1.0, [60.0, FOR_EVER], 0.4, 10.0),
         (2, Restart, 1.0, [700.0, FOR_EVER], 0.4, 10.0),
         (2, Clock, 1.0, [700.0, 760.0], 0.5, 10.0),
         (2, Dropout, 1.0, [1600.0, 1602.0], 8.0, 10.0),
+        (2, Accelerometer, 0.1, [650.0, 1100.0], 1.0, 10.0),
     ];
     crate::harness::in_parallel(&cases, |&(device, kind, size, window, angle, position)| {
         let case = faulty(device, kind, size, window, 23);

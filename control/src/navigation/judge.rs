@@ -13,7 +13,7 @@ use super::filter::{
 use super::line::Contradiction;
 use super::running::{Running, Source};
 use super::strapdown::{State, rotation};
-use super::watch::{DEPARTURE, FORGOTTEN, Heard, RUN};
+use super::watch::{DEPARTURE, FORGOTTEN, Heard, RECOVERY, RUN};
 use nalgebra::Vector3;
 use std::ops::Range;
 use vehicle::fixes::{GnssFix, StarFix};
@@ -22,8 +22,6 @@ use vehicle::frames::fixed_from_inertial;
 /// Greatest offset of the receiver's clock that is estimated, and greatest time by which a state is
 /// extrapolated to that of a measurement, s.
 const CLOCK_RANGE: f64 = 0.25;
-/// Time without a contradiction after which the filter counts as right again, s.
-const RECOVERY: f64 = 60.0;
 /// Factor by which standard deviations grow that have turned out too small.
 const GROWTH: f64 = 4.0;
 /// Standard deviations of the estimates of drag, wind, biases from which they are implausible.
@@ -45,6 +43,12 @@ impl Navigation {
     pub(super) fn take_gnss(&self, running: &mut Running, fix: &GnssFix) {
         let planet = &self.settings.planet;
         let noise = &self.settings.fix;
+        if running.clock != 0.0 && running.last.time - running.watches[0].at > FORGOTTEN {
+            // Nobody knows whether a clock that has been wrong still is.
+            running.covariance.fill_row(CLOCK, 0.0);
+            running.covariance.fill_column(CLOCK, 0.0);
+            running.covariance[(CLOCK, CLOCK)] = running.clock * running.clock;
+        }
         let time = fix.time + running.clock;
         let to_inertial = fixed_from_inertial(planet, time).transpose();
         let position = to_inertial * fix.position;
@@ -124,7 +128,15 @@ impl Navigation {
         let (error, covariance, squares) = updated(&running.covariance, measured);
         running.innovations[source as usize] = squares.min(f64::MAX);
         let watch = &mut running.watches[source as usize];
-        watch.note(running.last.time, squares, size);
+        watch.note(running.last.time, squares, measured[0].residual.signum(), size);
+        let force = match source {
+            Source::Side => Some(Contradiction::Side),
+            Source::Drag => Some(Contradiction::Drag),
+            Source::Gnss | Source::Star => None,
+        };
+        if let Some(force) = force.filter(|_| watch.is_surprised()[1]) {
+            running.surprise = Some((force, running.last.time));
+        }
         if !agrees {
             return Self::refuse(running, source);
         }
@@ -206,7 +218,7 @@ impl Navigation {
             if watch.agreed < RUN {
                 return (device, false);
             }
-            if watch.refused > 0 || watch.is_surprised() {
+            if watch.refused > 0 || watch.is_surprised()[0] {
                 return (device, true);
             }
         }
@@ -220,10 +232,13 @@ impl Navigation {
         }
         let settings = &self.settings;
         let wind = running.wind[0].abs().max(running.wind[1].abs());
-        if side.is_surprised() || wind > by_wind * settings.wind.deviation {
+        if let Some((force, _)) = running.surprise {
+            return (force, false);
+        }
+        if side.is_surprised()[0] || wind > by_wind * settings.wind.deviation {
             return (Contradiction::Side, false);
         }
-        if drag.is_surprised() || running.drag.abs() > by_drag * settings.drag.model {
+        if drag.is_surprised()[0] || running.drag.abs() > by_drag * settings.drag.model {
             return (Contradiction::Drag, false);
         }
         let recovers = time - running.restarted < RECOVERY;

@@ -7,10 +7,10 @@ use super::filter::{
     Measured, POSITION, SIDE, UNSEEN, VELOCITY, WIND, Way, gravity_gradient, kept, propagated,
 };
 use super::history::History;
-use super::line::Line;
+use super::line::{Contradiction, Line};
 use super::settings::{Alignment, Settings};
 use super::strapdown::{Felt, State};
-use super::watch::{Heard, Watch};
+use super::watch::{Heard, RECOVERY, Watch};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use vehicle::atmosphere::air_anywhere;
@@ -83,6 +83,9 @@ pub(super) struct Running {
     /// anew, and the time of the last such event, s.
     pub(super) doubts: [f64; 2],
     pub(super) restarted: f64,
+    /// Which force of the air has contradicted the filter, and when at last, s: fixes have not borne
+    /// it out since.
+    pub(super) surprise: Option<(Contradiction, f64)>,
     pub(super) rejected: u32,
     pub(super) innovations: [f64; 4],
 }
@@ -229,6 +232,7 @@ impl Navigation {
             misalignment: 0.0,
             doubts: [0.0; 2],
             restarted: f64::NEG_INFINITY,
+            surprise: None,
             rejected: 0,
             innovations: [0.0; 4],
         };
@@ -351,6 +355,7 @@ impl Navigation {
         };
         if matches!(source, Source::Gnss | Source::Star) {
             running.fixed = now;
+            running.surprise = running.surprise.filter(|(_, at)| now - at < RECOVERY);
         }
         running.covariance = *covariance;
         running.state.correct(error, 0.0);

@@ -7,10 +7,14 @@ use vehicle::math::exp;
 /// Measurements in a row that show that the filter is wrong, or that a device agrees with itself
 /// again.
 pub(super) const RUN: u32 = 5;
+/// Time without a contradiction after which the filter counts as right again, s.
+pub(super) const RECOVERY: f64 = 60.0;
 /// Times over which innovations are averaged, s.
 const WINDOWS: [f64; 3] = [1.0, 10.0, 60.0];
 /// Number of standard deviations by which such an average may exceed 1.
 const SURPRISE: f64 = 6.0;
+/// Number of standard deviations by which the mean of single innovations may depart from 0.
+const DRIFT: f64 = 5.0;
 /// Square beyond which an innovation counts no more: one outlier is forgotten within ten seconds.
 const LARGEST: f64 = 25.0;
 /// Multiple of the noise of a fix, and share of the way, by which the positions of a receiver may
@@ -30,6 +34,8 @@ pub(super) struct Watch {
     pub(super) jumped: bool,
     /// Averages of the squares of the normalised innovations per component over [`WINDOWS`].
     averages: [f64; 3],
+    /// Averages of single normalised innovations themselves, over the longer ones of these.
+    means: [f64; 2],
     /// Number of components of a measurement.
     size: usize,
 }
@@ -42,31 +48,43 @@ impl Default for Watch {
             agreed: RUN,
             jumped: false,
             averages: [1.0; 3],
+            means: [0.0; 2],
             size: 1,
         }
     }
 }
 
 impl Watch {
-    /// Notes the squares of normalised innovations at `time` (s).
-    pub(super) fn note(&mut self, time: f64, squares: f64, size: usize) {
+    /// Notes the squares of normalised innovations at `time` (s), and the sign of a single one.
+    pub(super) fn note(&mut self, time: f64, squares: f64, sign: f64, size: usize) {
         // A gap counts as a second.
         let elapsed = (time - self.at).clamp(0.0, 1.0);
         (self.at, self.size) = (time, size);
+        let squares = squares.min(LARGEST);
         for (average, window) in self.averages.iter_mut().zip(WINDOWS) {
-            *average += (squares.min(LARGEST) - *average) * (1.0 - exp(-elapsed / window));
+            *average += (squares - *average) * (1.0 - exp(-elapsed / window));
+        }
+        if size == 1 {
+            for (mean, window) in self.means.iter_mut().zip(&WINDOWS[1..]) {
+                *mean += (sign * squares.sqrt() - *mean) * (1.0 - exp(-elapsed / window));
+            }
         }
     }
 
-    /// Returns whether the innovations are larger than chance makes them. The mean of n squares has
+    /// Returns whether the innovations are larger than chance makes them, and whether they are so over
+    /// more than a second. The mean of n squares has
     /// the variance 2/n, and the weights of an average over a time T are those of (2 − a)/a
     /// measurements, with a the weight of one, if they come once a second.
-    pub(super) fn is_surprised(&self) -> bool {
-        self.averages.iter().zip(WINDOWS).any(|(average, window)| {
+    pub(super) fn is_surprised(&self) -> [bool; 2] {
+        let number = |window: f64| {
             let weight = 1.0 - exp(-1.0 / window);
-            let number = self.size as f64 * (2.0 - weight) / weight;
-            *average > 1.0 + SURPRISE * (2.0 / number).sqrt()
-        })
+            self.size as f64 * (2.0 - weight) / weight
+        };
+        let squares = [0, 1, 2]
+            .map(|i| self.averages[i] > 1.0 + SURPRISE * (2.0 / number(WINDOWS[i])).sqrt());
+        let drifts = [0, 1].map(|i| self.means[i].abs() > DRIFT / number(WINDOWS[i + 1]).sqrt());
+        let lasts = squares[2] || drifts.contains(&true);
+        [lasts || squares.contains(&true), lasts]
     }
 }
 

@@ -187,7 +187,9 @@ impl Line {
     /// Returns an error that names the id if there is no such value.
     pub fn positions(&self, values: &Values) -> Result<Vec<f64>, String> {
         let Quantity::Named(text) = &self.at else { return Ok(vec![values.number(&self.at)?]) };
-        let Some(text) = text.strip_prefix("± ") else { return Ok(vec![values.number(&self.at)?]) };
+        let Some(text) = text.strip_prefix("± ") else {
+            return Ok(vec![values.number(&self.at)?]);
+        };
         let at = text.parse().map_or_else(|_| values.number(&Quantity::Named(text.into())), Ok)?;
         Ok(vec![at, -at])
     }
