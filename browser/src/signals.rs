@@ -5,56 +5,27 @@
 pub const GUARANTEE: [&str; 2] =
     ["controller.guarantee.status", "controller.guarantee.contradiction"];
 
-/// Columns of a flight in which the attitude follows a given reference, in this order; in SI units,
-/// the guarantee as numbers of items. Every flight begins with time, the angles that the law
-/// receives, body rates, reference and moment.
-pub const ATTITUDE: &[&str] = &[
-    "time",
-    "plant.attitude.alpha",
-    "plant.attitude.beta",
-    "plant.attitude.sigma",
-    "plant.rate.p",
-    "plant.rate.q",
-    "plant.rate.r",
-    "controller.reference.alpha",
-    "controller.reference.beta",
-    "controller.reference.sigma",
-    "controller.moment.x",
-    "controller.moment.y",
-    "controller.moment.z",
-    GUARANTEE[0],
-    GUARANTEE[1],
-];
+/// Columns of a flight: time, the angles that the law receives, body rates, reference, moment, others,
+/// and the guarantee as numbers of items; in SI units.
+macro_rules! columns {
+    ($alpha:literal, $beta:literal; $($other:literal),*) => {
+        &[
+            "time", $alpha, $beta, "plant.attitude.sigma", "plant.rate.p", "plant.rate.q", "plant.rate.r",
+            "controller.reference.alpha", "controller.reference.beta", "controller.reference.sigma",
+            "controller.moment.x", "controller.moment.y", "controller.moment.z",
+            $($other,)* GUARANTEE[0], GUARANTEE[1],
+        ]
+    };
+}
+
+/// Columns of a flight in which the attitude follows a given reference.
+pub const ATTITUDE: &[&str] = columns!("plant.attitude.alpha", "plant.attitude.beta";);
 
 /// Columns of an entry flight, whose law receives the angles relative to the air.
-pub const ENTRY: &[&str] = &[
-    "time",
-    "plant.flow.alpha",
-    "plant.flow.beta",
-    "plant.attitude.sigma",
-    "plant.rate.p",
-    "plant.rate.q",
-    "plant.rate.r",
-    "controller.reference.alpha",
-    "controller.reference.beta",
-    "controller.reference.sigma",
-    "controller.moment.x",
-    "controller.moment.y",
-    "controller.moment.z",
-    "plant.motion.altitude",
-    "plant.motion.longitude",
-    "plant.motion.latitude",
-    "plant.motion.speed",
-    "plant.load.lift",
-    "plant.flow.density",
-    "plant.loadFactor",
-    "plant.heating.flux",
-    "plant.flight.dynamicPressure",
-    "guidance.range",
-    "guidance.reversals",
-    GUARANTEE[0],
-    GUARANTEE[1],
-];
+pub const ENTRY: &[&str] = columns!("plant.flow.alpha", "plant.flow.beta";
+    "plant.motion.altitude", "plant.motion.longitude", "plant.motion.latitude", "plant.motion.speed",
+    "plant.load.lift", "plant.flow.density", "plant.loadFactor", "plant.heating.flux",
+    "plant.flight.dynamicPressure", "guidance.range", "guidance.reversals");
 
 /// Parameter that asks a controller for its plan.
 pub const PLAN_SHOWN: &str = "plan.shown";

@@ -18,7 +18,7 @@ const DELAY: f64 = 0.117;
 fn flown(expected_delay: f64) -> Result<(f64, f64), Box<dyn std::error::Error>> {
     let scenario = Scenario::crmpc2022();
     let settings = Settings { delay: expected_delay, ..Settings::new(Constraints::Robust) };
-    let latency = Latency::of_action(expected_delay);
+    let latency = Latency { measurement: 0.0, action: expected_delay };
     let Settings { body, period_feedback, .. } = settings;
     let law = Crmpc::new(settings)?;
     let mut law = Delayed::new(law, body, period_feedback, latency, f64::INFINITY)?;

@@ -57,7 +57,8 @@ fn main() {
             "robust" => go.with(Crmpc::new(crmpc(Constraints::Robust, 0.0)).unwrap()),
             "delayed" => {
                 let settings = crmpc(Constraints::Robust, DELAY);
-                let (law, latency) = (Crmpc::new(settings).unwrap(), Latency::of_action(DELAY));
+                let (law, latency) =
+                    (Crmpc::new(settings).unwrap(), Latency { measurement: 0.0, action: DELAY });
                 let limit = settings.limit_moment;
                 go.with(Delayed::new(law, settings.body, FEEDBACK, latency, limit).unwrap());
             }

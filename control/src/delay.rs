@@ -50,11 +50,6 @@ pub struct Latency {
 }
 
 impl Latency {
-    /// Returns a latency of the command alone, s.
-    pub fn of_action(action: f64) -> Self {
-        Self { measurement: 0.0, action }
-    }
-
     /// Returns the sum of both parts, s.
     pub fn total(&self) -> f64 {
         self.measurement + self.action

@@ -70,8 +70,7 @@ fn published_limits_hold_at_every_sample_of_200_random_cases() {
                 assert_eq!(memory.report.status, AllocationStatus::Optimal, "{what}");
                 assert_within_limits(&before, &memory, &what);
                 let matrix = Effectors::published();
-                let achieved = matrix
-                    .moment_of_surfaces(&memory.surfaces, command.dynamic_pressure)
+                let achieved = matrix.effectiveness_at(command.dynamic_pressure) * memory.surfaces
                     + matrix.moment_of_jets(&memory.duty);
                 assert!((achieved - memory.achieved).norm() <= 1e-9 * size, "{what}");
                 assert!(
@@ -219,7 +218,7 @@ fn blending_uses_surfaces_first_and_above_the_threshold_only() {
     let effectors = Effectors::published();
     // An interior-point solution comes only close to a limit.
     assert!((memory.surfaces[4] - effectors.max[4]).abs() < 1e-6, "{}", memory.surfaces);
-    let rest = commanded.moment - effectors.moment_of_surfaces(&memory.surfaces, PRESSURE);
+    let rest = commanded.moment - effectors.effectiveness_at(PRESSURE) * memory.surfaces;
     assert!((effectors.moment_of_jets(&memory.duty) - (rest - memory.residual)).norm() < 1e-6);
     assert!(memory.duty.sum() > 1.0);
 }
@@ -232,7 +231,7 @@ fn blending_asks_no_more_of_the_surfaces_than_the_jets_can_make_up_for() {
     for moment in [[5e4; 3], [-5e4; 3]] {
         let memory = settled(&mut allocator(Method::Blending), 600, &command(moment, PRESSURE));
         assert!(memory.residual.norm() < 1.0, "{memory:?}");
-        let by_surfaces = Effectors::published().moment_of_surfaces(&memory.surfaces, PRESSURE);
+        let by_surfaces = Effectors::published().effectiveness_at(PRESSURE) * memory.surfaces;
         assert!(
             (by_surfaces - Vector3::from(moment)).norm() > 2e4,
             "jets are needed: {by_surfaces}"
@@ -425,7 +424,7 @@ fn a_failure_that_is_told_is_made_up_for() {
             _ => duty[5] = 0.0,
         }
         let given =
-            effectors.moment_of_surfaces(&memory.surfaces, 7e3) + effectors.moment_of_jets(&duty);
+            effectors.effectiveness_at(7e3) * memory.surfaces + effectors.moment_of_jets(&duty);
         assert!((given - memory.achieved).norm() < 1e-6, "{kind:?}: {}", given - memory.achieved);
         command.moment *= -1.0;
     }

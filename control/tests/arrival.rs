@@ -125,7 +125,7 @@ impl Jump {
             return self.fly_with(law, (ACCELERATION, end), |memory| memory);
         }
         let acceleration = ACCELERATION * law.design().assessment.moment_left / MOMENT_LEFT;
-        let latency = Latency::of_action(delay);
+        let latency = Latency { measurement: 0.0, action: delay };
         let law = Delayed::new(law, body, PERIOD, latency, limit_moment).unwrap();
         self.fly_with(law, (acceleration, end), |memory| &memory.inner)
     }

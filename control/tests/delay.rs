@@ -19,7 +19,7 @@ where
     C: Controller,
 {
     let body = settings(Constraints::Robust).body;
-    Delayed::new(inner, body, period, Latency::of_action(delay), limit)
+    Delayed::new(inner, body, period, Latency { measurement: 0.0, action: delay }, limit)
 }
 
 /// A plant on which commands act `delay` (s) after they are given.

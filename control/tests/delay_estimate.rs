@@ -22,7 +22,8 @@ fn fly(kind: DisturbanceKind, seed: u64, (told, truly): (f64, f64), scale: f64) 
     scenario.inertia_scale = scale;
     let mut settings = Settings::new(Constraints::Robust);
     (settings.delay, settings.guarantee) = (told, Guarantee::BestEffort);
-    let (law, latency) = (Crmpc::new(settings).unwrap(), Latency::of_action(told));
+    let (law, latency) =
+        (Crmpc::new(settings).unwrap(), Latency { measurement: 0.0, action: told });
     let mut law = Delayed::new(law, settings.body, PERIOD, latency, f64::INFINITY).unwrap();
     let mut memory = law.memory();
     let mut config = scenario.config(0.01);
@@ -82,7 +83,8 @@ fn oracle_commands_that_do_not_act_tell_no_delay() {
     let settings = Settings::new(Constraints::Robust);
     let (body, limit) = (settings.body, f64::INFINITY);
     let law = Crmpc::new(settings).unwrap();
-    let mut law = Delayed::new(law, body, PERIOD, Latency::of_action(0.0), limit).unwrap();
+    let mut law =
+        Delayed::new(law, body, PERIOD, Latency { measurement: 0.0, action: 0.0 }, limit).unwrap();
     let mut memory = law.memory();
     for tick in 0..1500 {
         let time = tick as f64 * PERIOD;
@@ -95,7 +97,7 @@ fn oracle_commands_that_do_not_act_tell_no_delay() {
 #[test]
 fn a_memory_that_begins_as_the_default_one_gives_the_same_estimate() {
     let (scenario, settings) = (Scenario::crmpc2022(), Settings::new(Constraints::Robust));
-    let (body, latency) = (settings.body, Latency::of_action(PERIOD));
+    let (body, latency) = (settings.body, Latency { measurement: 0.0, action: PERIOD });
     let law = Crmpc::new(settings).unwrap();
     let mut law = Delayed::new(law, body, PERIOD, latency, f64::INFINITY).unwrap();
     let mut memories = [law.memory(), Memory::default()];

@@ -143,7 +143,7 @@ impl Constant {
         scenario.disturbance.kind = self.kind;
         scenario.disturbance.bound = self.disturbance_bound;
         let law = Crmpc::new(*settings).unwrap();
-        let latency = Latency::of_action(self.delay);
+        let latency = Latency { measurement: 0.0, action: self.delay };
         let Settings { body, limit_moment, limit_rate, .. } = *settings;
         let mut law = Delayed::new(law, body, PERIOD, latency, limit_moment).unwrap();
         let (mut lost, mut largest) = (0, [0.0_f64; 2]);

@@ -49,7 +49,7 @@ fn a_measurement_that_is_not_finite_leaves_no_trace_in_any_law() {
         assert_refuses("CRMPC", Crmpc::new(settings).unwrap(), FEEDBACK);
     }
     let body = settings(Constraints::Robust).body;
-    let latency = Latency::of_action(0.06);
+    let latency = Latency { measurement: 0.0, action: 0.06 };
     let delayed = Delayed::new(lqr(), body, FEEDBACK, latency, f64::INFINITY).unwrap();
     assert_refuses("LQR with a delay", delayed, FEEDBACK);
     assert_refuses("LQR", lqr(), FEEDBACK);

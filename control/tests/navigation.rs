@@ -162,13 +162,8 @@ fn faults_are_survived_and_said() {
         let name = format!("{kind:?} {size} from {} s of device {device}", window[0]);
         let (mut beyond, mut worst, mut last) = (0.0, 0.0_f64, [0.0; 2]);
         fly(&case, |seen| {
-            let is_said =
-                matches!(seen.health, Health::Suspect | Health::Inconsistent | Health::Lost);
-            let of_angles = seen.errors.iter().zip(seen.predicted);
-            let largest = of_angles.map(|(error, deviation)| error.abs() / deviation);
-            let [error, deviation] = seen.position_error;
-            let largest = largest.fold(error / (3_f64.sqrt() * deviation), f64::max);
-            beyond = if largest > 5.0 && !is_said { beyond + 1.0 } else { 0.0 };
+            let largest = seen.deviations();
+            beyond = if largest > 5.0 && !seen.is_said() { beyond + 1.0 } else { 0.0 };
             assert!(beyond <= 10.0, "{name}: {largest} deviations at {} s", seen.time);
             if seen.time > 60.0 {
                 worst = worst.max(seen.errors[..3].iter().fold(0.0, |a, b| b.abs().max(a)));

@@ -126,18 +126,10 @@ impl Effectors {
         Err("surfaces.table: a table is not full".into())
     }
 
-    /// Surface effectiveness D_A of Wu 2015 (58) at a dynamic pressure (Pa), N m/rad.
+    /// Surface effectiveness D_A of Wu 2015 (58) at a dynamic pressure (Pa), N m/rad. The moment of
+    /// the surfaces is D_A δ_A, (57).
     pub fn effectiveness_at(&self, dynamic_pressure: f64) -> SMatrix<f64, 3, SURFACES> {
         self.effectiveness * (dynamic_pressure / self.reference_pressure)
-    }
-
-    /// Moment D_A δ_A of Wu 2015 (57) in N m, for `deflections` (rad) at a dynamic pressure (Pa).
-    pub fn moment_of_surfaces(
-        &self,
-        deflections: &Surfaces,
-        dynamic_pressure: f64,
-    ) -> Vector3<f64> {
-        self.effectiveness * deflections * (dynamic_pressure / self.reference_pressure)
     }
 
     /// Moment of the surfaces with tables in a flow (N m), for `deflections` (rad).

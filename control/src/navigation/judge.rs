@@ -129,12 +129,8 @@ impl Navigation {
         running.innovations[source as usize] = squares.min(f64::MAX);
         let watch = &mut running.watches[source as usize];
         watch.note(running.last.time, squares, measured[0].residual.signum(), size);
-        let force = match source {
-            Source::Side => Some(Contradiction::Side),
-            Source::Drag => Some(Contradiction::Drag),
-            Source::Gnss | Source::Star => None,
-        };
-        if let Some(force) = force.filter(|_| watch.is_surprised()[1]) {
+        let force = [None, None, Some(Contradiction::Side), Some(Contradiction::Drag)];
+        if let Some(force) = force[source as usize].filter(|_| watch.is_surprised()[1]) {
             running.surprise = Some((force, running.last.time));
         }
         if !agrees {

@@ -237,6 +237,20 @@ pub(crate) struct Seen {
 }
 
 impl Seen {
+    /// Returns the largest error of an angle or of the position over its predicted deviation.
+    pub(crate) fn deviations(&self) -> f64 {
+        let of_angles = self.errors.iter().zip(self.predicted);
+        let largest = of_angles.map(|(error, deviation)| error.abs() / deviation);
+        let [error, deviation] = self.position_error;
+        largest.fold(error / (3_f64.sqrt() * deviation), f64::max)
+    }
+
+    /// Returns whether `health` says that the state is not to be trusted.
+    pub(crate) fn is_said(&self) -> bool {
+        use navigation::Health::{Inconsistent, Lost, Suspect};
+        matches!(self.health, Inconsistent | Lost | Suspect)
+    }
+
     /// Returns whether the error of an angle, and that of the position, are within their bounds.
     pub(crate) fn is_protected(&self) -> [bool; 2] {
         let [_, _, sigma, alpha, beta] = self.errors.map(f64::abs);
@@ -392,12 +406,25 @@ pub(crate) fn faulty(
 /// Returns the shares of the instants at which an angle or the position is wrong by more than its
 /// bound.
 pub(crate) fn exceeded(case: &Case) -> [f64; 2] {
+    judged(case).0
+}
+
+/// Returns the same, and the number of times at which an error begins to exceed five of its predicted
+/// deviations, and of those that `health` does not say within ten seconds. Sees the flight once a
+/// second.
+pub(crate) fn judged(case: &Case) -> ([f64; 2], [u32; 2]) {
     let (mut count, mut beyond) = (0.0, [0.0; 2]);
+    let (mut times, mut lasted, mut unsaid) = ([0; 2], 0, 0);
     fly(case, |seen| {
+        let is_large = seen.deviations() > 5.0;
+        times[0] += u32::from(is_large && lasted == 0);
+        lasted = if is_large { lasted + 1 } else { 0 };
+        unsaid = if is_large && !seen.is_said() { unsaid + 1 } else { 0 };
+        times[1] += u32::from(unsaid == 11);
         count += 1.0;
         for (sum, is_within) in beyond.iter_mut().zip(seen.is_protected()) {
             *sum += f64::from(u8::from(!is_within));
         }
     });
-    beyond.map(|sum| sum / count)
+    (beyond.map(|sum| sum / count), times)
 }

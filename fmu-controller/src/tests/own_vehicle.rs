@@ -48,7 +48,7 @@ fn oracle_the_allocator_gives_the_moment_by_the_tables_of_the_surfaces() {
     let effectors = vehicle.effectors.unwrap();
     let flow = allocator.command.flow();
     let surfaces = allocator.output.surfaces;
-    let by_surfaces = effectors.moment_of_surfaces(&surfaces, flow.dynamic_pressure)
+    let by_surfaces = effectors.effectiveness_at(flow.dynamic_pressure) * surfaces
         + effectors.moment_of_tables(&flow, &surfaces);
     assert!((by_surfaces - allocator.output.by_surfaces).amax() < 1e-9);
     assert!(surfaces[2].abs() > 0.01, "the flap has a table only");

@@ -186,11 +186,12 @@ impl Line {
     /// # Errors
     /// Returns an error that names the id if there is no such value.
     pub fn positions(&self, values: &Values) -> Result<Vec<f64>, String> {
-        let Quantity::Named(text) = &self.at else { return Ok(vec![values.number(&self.at)?]) };
-        let Some(text) = text.strip_prefix("± ") else {
-            return Ok(vec![values.number(&self.at)?]);
-        };
-        let at = text.parse().map_or_else(|_| values.number(&Quantity::Named(text.into())), Ok)?;
-        Ok(vec![at, -at])
+        if let Quantity::Named(text) = &self.at
+            && let Some(text) = text.strip_prefix("± ")
+        {
+            let named = |_| values.number(&Quantity::Named(text.into()));
+            return text.parse().or_else(named).map(|at: f64| vec![at, -at]);
+        }
+        values.number(&self.at).map(|at| vec![at])
     }
 }

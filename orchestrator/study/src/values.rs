@@ -85,13 +85,10 @@ impl TryFrom<String> for ShownMetric {
     type Error = String;
 
     fn try_from(text: String) -> Result<Self, String> {
-        let Some((factor, metric)) = text.split_once(" * ") else {
-            return Ok(Self { metric: text, factor: 1.0 });
-        };
-        match factor.parse::<f64>() {
-            Ok(factor) if factor.is_finite() => Ok(Self { metric: metric.into(), factor }),
-            _ => Err(format!("\"{factor}\" is no factor: write \"NAME\" or \"100 * NAME\"")),
-        }
+        let (factor, metric) = text.split_once(" * ").unwrap_or(("1", &text));
+        let number = factor.parse().ok().filter(|factor: &f64| factor.is_finite());
+        let problem = || format!("\"{factor}\" is no factor: write \"NAME\" or \"100 * NAME\"");
+        Ok(Self { metric: metric.into(), factor: number.ok_or_else(problem)? })
     }
 }
 

@@ -124,7 +124,7 @@ impl Flight {
         let s = self.settings;
         let law = Crmpc::new(s)?;
         let ratio = law.design().ratio as u64;
-        let latency = Latency::of_action(s.delay);
+        let latency = Latency { measurement: 0.0, action: s.delay };
         let mut controller = Delayed::new(law, s.body, s.period_feedback, latency, s.limit_moment)?;
         let mut memory = controller.memory();
         let mut transport = Transport::new(s.delay).unwrap_or_default();

@@ -93,16 +93,13 @@ fn surfaces_act_per_degree_and_with_dynamic_pressure() {
     deflections[4] = 2f64.to_radians();
     deflections[1] = -1f64.to_radians();
     let at_reference = [2750.0 + 2800.0, -10200.0 + 1750.0, -2000.0 - 650.0];
-    near(effectors.moment_of_surfaces(&deflections, 2859.0), at_reference);
-    near(
-        effectors.moment_of_surfaces(&deflections, 1429.5),
-        at_reference.map(|moment| moment / 2.0),
-    );
+    near(effectors.effectiveness_at(2859.0) * deflections, at_reference);
+    near(effectors.effectiveness_at(1429.5) * deflections, at_reference.map(|moment| moment / 2.0));
     assert_eq!(
         effectors.effectiveness_at(1429.5) * deflections,
-        effectors.moment_of_surfaces(&deflections, 1429.5)
+        effectors.effectiveness_at(1429.5) * deflections
     );
-    near(effectors.moment_of_surfaces(&deflections, 0.0), [0.0; 3]);
+    near(effectors.effectiveness_at(0.0) * deflections, [0.0; 3]);
 }
 
 /// The columns of mirrored surfaces form pairs like those of the jets.
