@@ -50,6 +50,7 @@ impl Model for ReentryPlant {
             vehicle: None,
             plant: None,
             fixed: Passage::default(),
+            inertia_errors: [0.0; 2],
             event_driven: false,
         }
     }
@@ -61,6 +62,9 @@ impl Model for ReentryPlant {
         self.vehicle = self.parameters.load_vehicle(context)?;
         let config = self.parameters.config(self.vehicle.as_deref()).map_err(failed)?;
         self.plant = Some(Box::new(Plant::new(&config, context.start_time).map_err(failed)?));
+        let nominal = self.vehicle.as_deref().unwrap_or_else(|| Vehicle::papers()).inertia;
+        let errors = self.ready()?.body().error_from(&nominal.matrix());
+        self.inertia_errors = errors.unwrap_or_default();
         self.event_driven = false;
         Ok(())
     }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use settings::Declared;
 use vehicle::Vehicle;
 use vehicle::actuators::Command;
-use vehicle::axes::{ANGLES, AXES, RATES};
+use vehicle::axes::{ANGLES, AXES, Entry, RATES};
 use vehicle::effectors::{SURFACE_NAMES, SURFACES, Surfaces};
 use vehicle::entry::{MOTION as MOTION_NAMES, Motion, NOMINALS, Passage, RATE_UNITS, UNITS};
 use vehicle::plant::{Held, Input, Plant};
@@ -45,6 +45,9 @@ pub struct ReentryPlant {
     /// Fixed flight condition, in use without an entry flight.
     #[setting(skip)]
     pub(crate) fixed: Passage,
+    /// Error of the inertia: a common factor, and the rest.
+    #[setting(skip)]
+    pub(crate) inertia_errors: [f64; 2],
     /// Whether the instance runs in model exchange: held quantities then change at events only, and
     /// not when time passes a tick or an input is set.
     #[setting(skip)]
@@ -82,6 +85,15 @@ pub(crate) struct Output {
     #[setting(depends_on = ["attitude.alpha", "attitude.beta", "rate.*", "moment.*", "jet[*",
         "deflection[*", "motion.*", "attitude.*"])]
     pub(crate) delta: Vector3<f64>,
+    /// All that acts on the second time derivative of the {} but the control moment, as an
+    /// acceleration: disturbance.delta, disturbance.moment and airMoment.
+    #[setting(name = "disturbance.total", each = ANGLES, unit = "rad/s2", nominal = 0.03)]
+    #[setting(depends_on = ["attitude.*", "rate.*", "moment.*", "jet[*", "deflection[*",
+        "motion.*", "disturbanceMoment.*", "trim.alpha"])]
+    pub(crate) total_disturbance: Vector3<f64>,
+    /// Relative error of the vehicle's inertia, {}.
+    #[setting(name = "inertia", each = INERTIA_ERRORS, discrete)]
+    pub(crate) inertia_errors: [f64; 2],
     /// Disturbance moment about the {}: external input plus sine.
     #[setting(name = "disturbance.moment", each = AXES, unit = "N.m", nominal = 1e4)]
     #[setting(depends_on = ["disturbanceMoment{.}"])]
@@ -124,6 +136,10 @@ pub(crate) struct Output {
     pub(crate) air_moment: Vector3<f64>,
 }
 
+/// Parts of the error of the inertia, by docs/guarantee.md.
+const INERTIA_ERRORS: [Entry; 2] =
+    [(".error", "as a common factor"), (".tensorError", "besides the common factor")];
+
 /// Typical magnitudes of the rates of the motion.
 const RATE_NOMINALS: [f64; 6] = [1e3, 0.01, 0.01, 10.0, 1e-3, 0.01];
 
@@ -152,6 +168,7 @@ impl ReentryPlant {
             heat_flux = plant.heat_flux(entering);
             (passage, motion_rate) = (entering.passage, entering.derivative);
         }
+        let disturbance_moment = plant.disturbance_moment(time, &self.input, held);
         let mut indicators = SVector::<f64, INDICATORS>::repeat(AT_REST);
         let left = plant.time_left(held);
         for (indicator, left) in indicators.iter_mut().zip(left.iter()) {
@@ -169,7 +186,9 @@ impl ReentryPlant {
             angular_acceleration: derivative.fixed_rows::<3>(3).into(),
             applied_moment: plant.applied_moment(entering, &self.input, held),
             delta: held.delta(),
-            disturbance_moment: plant.disturbance_moment(time, &self.input, held),
+            total_disturbance: plant.total_disturbance(&(disturbance_moment + air_moment), held),
+            inertia_errors: self.inertia_errors,
+            disturbance_moment,
             deflections: plant.deflections,
             deflection_rates: plant.deflection_rates(held),
             indicators,

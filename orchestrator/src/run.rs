@@ -162,7 +162,7 @@ impl<'a> Outputs<'a> {
         Panel::resolve_all(system)?;
         let watch = (options.page || !options.no_plot).then(|| Watch::new(system)).transpose()?;
         for doubt in system.doubts() {
-            tracing::warn!("{doubt}");
+            tracing::warn!("{}", doubt.text);
         }
         let stem = system.experiment.source.path.file_stem();
         let name = stem.map_or("run".into(), |stem| stem.to_string_lossy().into_owned());

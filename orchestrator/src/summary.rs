@@ -156,7 +156,7 @@ fn guarantee(metrics: &Metrics) -> Option<SummaryLine> {
     let unfounded = number("unfounded_at").map_or(String::new(), |time| {
         let what = metrics.text("guarantee_unfounded").unwrap_or_default();
         let time = rounded(time);
-        format!("; while it was in force, an ASSUMPTION did not hold at t = {time} s: {what} > 1")
+        format!("; while it was in force, an ASSUMPTION did not hold at t = {time} s: {what}")
     });
     let late = number("late_at").map_or(String::new(), |time| {
         let time = rounded(time);
@@ -284,7 +284,7 @@ mod tests {
         assert_eq!(guarantee(&never).unwrap().text, "never in force (refused)");
         let without_margins = guarantee(&metrics(&[("share", number(1.0))])).unwrap();
         assert_eq!(without_margins.text, "in force throughout");
-        let unfounded = [("unfounded", text("a.b / a.c")), ("unfounded_at", number(12.5))];
+        let unfounded = [("unfounded", text("a.b / a.c > 1")), ("unfounded_at", number(12.5))];
         let unfounded = guarantee(&metrics(&[&throughout[..], &unfounded].concat())).unwrap();
         assert_eq!(
             unfounded.text,

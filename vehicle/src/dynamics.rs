@@ -6,6 +6,9 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use settings::Declared;
 
+/// Relative error of an inertia that rounding explains.
+const ROUNDING: f64 = 1e-12;
+
 /// Moments and products of inertia in the sign convention of Chai 2022 (3): the off-diagonal
 /// entries of the tensor are −I_ij.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
@@ -113,6 +116,21 @@ impl RigidBody {
         moment: &Vector3<f64>,
     ) -> Vector3<f64> {
         self.inverse * (moment - rates.cross(&(self.inertia * rates)))
+    }
+
+    /// Returns how the tensor differs from a nominal one (kg m²) by I = (1 + c) I₀^½ (1 + E) I₀^½: c
+    /// and the spectral norm of E, which is the smallest that any c allows. What rounding explains
+    /// is no difference.
+    ///
+    /// # Errors
+    /// Returns `None` if the nominal tensor is not positive definite.
+    pub fn error_from(&self, nominal: &Matrix3<f64>) -> Option<[f64; 2]> {
+        // The congruent L⁻¹ I L⁻ᵀ with I₀ = L Lᵀ has the eigenvalues of I₀^-½ I I₀^-½.
+        let inverse = nominal.cholesky()?.l().try_inverse()?;
+        let ratios = (inverse * self.inertia * inverse.transpose()).symmetric_eigenvalues();
+        let (least, largest) = (ratios.min(), ratios.max());
+        let errors = [f64::midpoint(largest, least) - 1.0, (largest - least) / (largest + least)];
+        Some(errors.map(|error| if error.abs() < ROUNDING { 0.0 } else { error }))
     }
 
     /// Drift f(Θ, x_ω) = Ṙ ω − R I⁻¹ Ω I ω of ẍ_Θ = f + u, Chai 2022 (4b), in rad/s².

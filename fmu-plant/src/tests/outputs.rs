@@ -1,5 +1,6 @@
 //! Outputs between steps and events.
 
+use super::entry::entering;
 use super::prelude::*;
 use super::sensors::mems;
 use super::{delayed, in_model_exchange, outputs, started, step};
@@ -14,6 +15,56 @@ fn outputs_are_right_from_initialization_on() {
     // At rest ω̇ = R⁻¹ Δ holds.
     let expected = vehicle::kinematics::r_inverse(&output.angles) * output.delta;
     assert!((output.angular_acceleration - expected).amax() < 1e-15);
+}
+
+#[test]
+fn oracle_what_neither_the_control_moment_nor_inertia_explains_is_the_total_disturbance() {
+    for enters in [false, true] {
+        let mut instance = started(|instance| {
+            if enters {
+                entering(instance);
+            }
+            instance.parameters.kind = DisturbanceKind::Constant;
+            instance.parameters.inertia_ratios = [0.9, 1.1, 1.0, 1.3, 1.0, 1.0];
+            instance.parameters.initial.rates = Vector3::new(0.02, -0.03, 0.01);
+        });
+        instance.input.moment = Vector3::new(3e4, -2e4, 1e4);
+        instance.input.disturbance_moment = Vector3::new(4e3, 5e3, -6e3);
+        let output = outputs(&mut instance, 0.0);
+        let explained = instance
+            .ready()
+            .unwrap()
+            .body()
+            .angular_acceleration(&output.rates, &output.applied_moment);
+        let kinematics = instance.parameters.kinematics.r(&output.angles);
+        let rest = kinematics * (output.angular_acceleration - explained);
+        assert!((output.total_disturbance - rest).amax() < 1e-12, "{}", output.total_disturbance);
+        assert!((output.total_disturbance - output.delta).amax() > 1e-3, "enters: {enters}");
+    }
+}
+
+#[test]
+fn oracle_the_error_of_the_inertia_is_the_one_that_made_it() {
+    let errors = |ratios: [f64; 3], scale| {
+        let mut instance = started(|instance| {
+            let [xx, yy, zz] = ratios;
+            instance.parameters.inertia_ratios = [xx, yy, zz, 0.0, 1.0, 1.0];
+            instance.parameters.inertia_scale = scale;
+        });
+        outputs(&mut instance, 0.0).inertia_errors
+    };
+    let mut nominal = started(|instance| instance.parameters.inertia_scale = 1.05);
+    let [common, rest] = outputs(&mut nominal, 0.0).inertia_errors;
+    assert!((common - 0.05).abs() < 1e-15 && rest == 0.0, "{common} {rest}");
+    // Wu's nominal tensor has a product of inertia, which the ratio 0 removes.
+    let inertia = Scenario::crmpc2022().inertia;
+    let [common, rest] = errors([1.0; 3], 1.0);
+    let product = inertia.Ixz / (inertia.Ixx * inertia.Izz).sqrt();
+    // The eigenvalues 1/(1 ± p) of the pencil and 1.
+    let (least, largest) = (1.0 / (1.0 + product.abs()), 1.0 / (1.0 - product.abs()));
+    assert!((common - (f64::midpoint(least, largest) - 1.0)).abs() < 1e-12, "{common}");
+    assert!((rest - (largest - least) / (largest + least)).abs() < 1e-12, "{rest}");
+    assert!(rest > 0.01);
 }
 
 #[test]

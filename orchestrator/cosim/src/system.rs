@@ -10,7 +10,7 @@ use crate::signal::{Resolved, Signal, Term};
 use crate::watch::Watched;
 use crate::wiring::Column;
 use fmi_master::clock::Clock;
-use fmi_master::delay::{self, FeedbackLoop, Reading};
+use fmi_master::delay::{self, Doubt, FeedbackLoop, Reading};
 use fmi_master::description::{InterfaceKind, ModelDescription, VariableKind};
 use fmi_master::master::{Master, Member};
 use fmi_master::names;
@@ -202,9 +202,9 @@ impl System {
         readings.iter().any(|(_, reading)| *reading == Reading::AfterStep)
     }
 
-    /// Returns one warning for each component whose control law is designed for another loop delay.
-    pub fn doubts(&self) -> Vec<String> {
-        delay::warnings(&self.parts(), &self.settings(), &self.loops, self.clock.step())
+    /// Returns a doubt for each component whose control law is designed for another loop delay.
+    pub fn doubts(&self) -> Vec<Doubt> {
+        delay::doubts(&self.parts(), &self.settings(), &self.loops, self.clock.step())
     }
 
     /// Returns the full names of the probed variables, in the order of a sample's values, and

@@ -246,20 +246,31 @@ const COUNTED_ON: &str = "delay";
 /// Parameter by which a component states how much later than commanded its actuators act, s.
 const TRANSPORT: &str = "actuation.delay";
 
-/// Returns one warning for each component whose control law is designed for another delay than its
+/// A component whose control law is designed for another delay than its feedback loop has.
+#[derive(Clone, Debug)]
+pub struct Doubt {
+    /// Index of the component.
+    pub component: usize,
+    /// Whether none of its loops has the delay that the law is designed for.
+    pub certain: bool,
+    /// What is set, and what should be.
+    pub text: String,
+}
+
+/// Returns a doubt for each component whose control law is designed for another delay than its
 /// feedback loop has. The loop's delay is its ticks times `step` (s), plus the transport delays of
 /// the other components on it. If there are several loops, the one with the longest delay counts;
-/// the warning says so if another one has the delay that the law is designed for. If the component
+/// the doubt says so if another one has the delay that the law is designed for. If the component
 /// responds to some of its loops at once, those through its states alone do not count: the values
 /// that they carry, as the moment that actuators achieved, are a record of earlier ticks and not
 /// the measurement that the law acts upon.
-pub fn warnings(
+pub fn doubts(
     parts: &[Part],
     settings: &[Vec<Setting>],
     loops: &[FeedbackLoop],
     step: f64,
-) -> Vec<String> {
-    let mut warnings = Vec::new();
+) -> Vec<Doubt> {
+    let mut doubts = Vec::new();
     for (component, part) in parts.iter().enumerate() {
         let Some(counted_on) = duration(COUNTED_ON, parts[component], &settings[component]) else {
             continue;
@@ -282,10 +293,11 @@ pub fn warnings(
         let delays: Vec<_> = delays.collect();
         let longest = delays.iter().max_by(|(a, _), (b, _)| a.total_cmp(b));
         let Some(&(delay, longest)) = longest.filter(|(delay, _)| !fits(*delay)) else { continue };
-        let unless = if delays.iter().any(|(delay, _)| fits(*delay)) {
-            ", unless its measurements come through another of its loops, which has the delay that is set"
-        } else {
+        let certain = !delays.iter().any(|(delay, _)| fits(*delay));
+        let unless = if certain {
             ""
+        } else {
+            ", unless its measurements come through another of its loops, which has the delay that is set"
         };
         let names: Vec<&str> = longest
             .components
@@ -294,12 +306,13 @@ pub fn warnings(
             .map(|&index| parts[index].name)
             .collect();
         let (name, delay) = (part.name, rounded(delay));
-        warnings.push(format!(
+        let text = format!(
             "{name}.{COUNTED_ON} = {counted_on} s, but the loop {} has a delay of {delay} s: set {name}.{COUNTED_ON} = {delay}{unless}",
             names.join(" -> ")
-        ));
+        );
+        doubts.push(Doubt { component, certain, text });
     }
-    warnings
+    doubts
 }
 
 /// Returns the value of a real parameter in s, from the experiment or otherwise its start value;

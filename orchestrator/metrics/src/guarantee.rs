@@ -24,8 +24,9 @@ pub struct GuaranteeSignals {
     /// Signals as multiples of their limits, which must not exceed 1 while the guarantee is in
     /// force.
     pub keeps: Vec<Resolved>,
-    /// Signals, with their texts, that the guarantee assumes not to exceed 1.
-    pub assumes: Vec<(String, Resolved)>,
+    /// Signals that the guarantee assumes not to exceed 1, each with what it says otherwise; none
+    /// for what is wrong at any time.
+    pub assumes: Vec<(String, Option<Resolved>)>,
     /// What counts as a late arrival at the reference.
     pub late: Option<LateSignals>,
 }
@@ -104,8 +105,14 @@ impl GuaranteeSignals {
         let observe = system.experiment.observe.clone();
         for signal in guarantee.assumes.as_ref().map_or(Ok(&[][..]), |name| observe.list(name))? {
             if !signal.paths().iter().any(|path| is_left_out(path, system)) {
-                signals.assumes.push((signal.clone().into(), system.resolve(signal)?));
+                signals.assumes.push((format!("{signal} > 1"), Some(system.resolve(signal)?)));
             }
+        }
+        if guarantee.assumes.is_some() {
+            let component = guarantee.in_force.split_once('.').map(|(component, _)| component);
+            let wrong = system.doubts().into_iter().filter(|doubt| doubt.certain);
+            let wrong = wrong.filter(|doubt| component == Some(system.names()[doubt.component]));
+            signals.assumes.extend(wrong.map(|doubt| (doubt.text, None)));
         }
         let mut of_list = |name: &Option<String>| {
             let mut found = Vec::new();
@@ -205,9 +212,10 @@ impl Observer for GuaranteeRecord {
                 *smallest = smallest.iter().copied().chain([values[*place]]).reduce(smaller);
             }
             self.broken |= self.signals.keeps.iter().any(|signal| signal.is_beyond_one(values));
-            let beyond = |(_, signal): &(String, Resolved)| signal.is_beyond_one(values);
             if self.unfounded.is_none() {
-                let found = self.signals.assumes.iter().position(beyond);
+                let found = self.signals.assumes.iter().position(|(_, signal)| {
+                    signal.as_ref().is_none_or(|signal| signal.is_beyond_one(values))
+                });
                 self.unfounded = found.map(|index| (sample.time, index));
             }
         } else if self.ticks_in_force > 0 && self.lost.is_none() {
@@ -275,9 +283,9 @@ mod tests {
     #[test]
     fn an_error_beyond_the_declared_is_told_only_while_in_force() {
         let error = Resolved { over: Some(2), ..Resolved::difference(1, 3) };
-        let unfounded = |rows: &[[f64; 4]]| {
+        let unfounded_with = |third: Option<Resolved>, rows: &[[f64; 4]]| {
             let assumes =
-                vec![("other".into(), Resolved::variable(3)), ("error".into(), error.clone())];
+                vec![("other".into(), Some(Resolved::variable(3))), ("error".into(), third)];
             let signals = GuaranteeSignals { assumes, ..GuaranteeSignals::default() };
             let mut record = GuaranteeRecord::new(signals);
             for (tick, values) in rows.iter().enumerate() {
@@ -286,12 +294,15 @@ mod tests {
             }
             record.unfounded
         };
+        let unfounded = |rows: &[[f64; 4]]| unfounded_with(Some(error.clone()), rows);
         // In force, measured, declared, true: without an error none need be declared.
         assert_eq!(unfounded(&[[1.0, 0.5, 0.0, 0.5], [1.0, 0.5, 0.1, 0.6]]), None);
         assert_eq!(unfounded(&[[0.0, 0.5, 0.0, 0.6], [1.0, 0.5, 0.2, 0.6]]), None);
         let broken = [[1.0, 0.5, 0.2, 0.6], [1.0, 0.5, 0.0, 0.6], [1.0, 0.5, 0.0, 9.0]];
         assert_eq!(unfounded(&broken), Some((1.0, 1)));
         assert_eq!(unfounded(&[[1.0, f64::NAN, 1.0, 0.0]]), Some((0.0, 1)));
+        // What is wrong at any time is told when the guarantee comes into force.
+        assert_eq!(unfounded_with(None, &[[0.0; 4], [1.0, 0.0, 0.0, 0.0]]), Some((1.0, 1)));
     }
 
     #[test]

@@ -103,7 +103,11 @@ fn with_duration(mut description: ModelDescription, name: &str, unit: &str) -> M
     description
 }
 
-/// Returns the warnings for a controller and a plant with these values of `delay` and
+fn texts(doubts: Vec<Doubt>) -> Vec<String> {
+    doubts.into_iter().map(|doubt| doubt.text).collect()
+}
+
+/// Returns the doubts about a controller and a plant with these values of `delay` and
 /// `actuation.delay`, at a step of 0.04 s.
 fn warned(counted_on: Option<f64>, transport: Option<f64>, coupling: Coupling) -> Vec<String> {
     let controller = with_duration(description(&[Some(true)]), "delay", "s");
@@ -119,7 +123,7 @@ fn warned(counted_on: Option<f64>, transport: Option<f64>, coupling: Coupling) -
     };
     let settings = [setting("delay", counted_on), setting("actuation.delay", transport)];
     let loops = feedback_loops(&parts, &[1, 1], &[wire((0, 1), 1), wire((1, 1), 0)], coupling);
-    warnings(&parts, &settings, &loops, 0.04)
+    texts(doubts(&parts, &settings, &loops, 0.04))
 }
 
 #[test]
@@ -157,9 +161,10 @@ fn the_longest_loop_counts_and_what_is_on_no_loop_does_not() {
         [wire((0, 1), 1), wire((1, 1), 0), wire((0, 1), 2), wire((2, 1), 0), wire((2, 1), 3)];
     let loops = feedback_loops(&parts, &[1; 4], &wires, Coupling::Sequential);
     let none = [const { Vec::new() }; 4];
-    let warnings = warnings(&parts, &none, &loops, 0.5);
+    let doubts = doubts(&parts, &none, &loops, 0.5);
+    assert!(!doubts[0].certain);
     assert_eq!(
-        warnings,
+        texts(doubts),
         ["c.delay = 0 s, but the loop c -> c -> c has a delay of 0.5 s: set c.delay = 0.5, \
           unless its measurements come through another of its loops, which has the delay that is set"]
     );
@@ -180,7 +185,7 @@ fn a_loop_through_the_states_of_a_law_does_not_count_beside_one_to_which_it_resp
     let flight = [wire((0, 1), 2), wire((2, 1), 0)];
     let warned = |wires: &[Wire], coupling| {
         let loops = feedback_loops(&parts, &[1; 3], wires, coupling);
-        warnings(&parts, &[const { Vec::new() }; 3], &loops, 0.5)
+        texts(doubts(&parts, &[const { Vec::new() }; 3], &loops, 0.5))
     };
     let both = [record, flight].concat();
     assert!(warned(&both, Coupling::Sequential).is_empty());
@@ -198,7 +203,7 @@ fn a_parameter_that_is_no_duration_means_something_else() {
     let loops =
         feedback_loops(&parts, &[1, 1], &[wire((0, 1), 1), wire((1, 1), 0)], Coupling::Jacobi);
     assert_eq!(loops.len(), 1);
-    assert!(warnings(&parts, &[Vec::new(), Vec::new()], &loops, 0.04).is_empty());
+    assert!(doubts(&parts, &[Vec::new(), Vec::new()], &loops, 0.04).is_empty());
 }
 
 #[test]
