@@ -168,7 +168,12 @@ impl Questions {
             leaving: None,
         });
         // What refuses the settings as they are says so in its own words.
-        as_set.start()?;
+        match system.start_varied(&self.as_set, interrupt) {
+            Err(Error::Call { component, failure, .. }) if failure.is_answer => {
+                tracing::error!("{component}: {}", failure.message);
+            }
+            started => drop(started?),
+        }
         let _silence = warnings::silence();
         let mut rows = Vec::new();
         let mut add = |answer: String, shown: &Resolved, set, ask: &Ask| {

@@ -76,7 +76,6 @@ impl<F: Table> FmuInstance<F> {
             let message = log.take().unwrap_or_else(|| "its library returned no instance".into());
             return Err(format!("could not be instantiated: {message}"));
         }
-        log.is_instantiated();
         let functions = ManuallyDrop::new(functions);
         let data = Rc::new(InstanceData { functions, _callbacks: callbacks, _listed: listed, log });
         Ok(Self {

@@ -5,7 +5,6 @@ use crate::isolation::page;
 use crate::warnings;
 use parking_lot::Mutex;
 use std::ffi::c_int;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Largest number of messages of an instance that are printed in a second.
@@ -13,16 +12,17 @@ const MOST: u64 = 100;
 /// Largest number of bytes of a message.
 const LONGEST: usize = 2000;
 
-/// Forwards the log messages of an instance, and stores the last one that reports a problem.
+/// Forwards the log messages of an instance. The last one that reports a problem waits, as it is
+/// part of the error that follows if the call fails.
 pub(crate) struct Log {
     pub(crate) component: String,
-    last: Mutex<Option<String>>,
+    problem: Mutex<Option<Problem>>,
     event: Mutex<Option<String>>,
-    /// Whether the instance is being instantiated. Messages about problems are then part of the
-    /// error that follows.
-    instantiates: AtomicBool,
     pace: Mutex<Pace>,
 }
+
+/// A message that reports a problem: its status, its category and its text.
+type Problem = (Result<Status, c_int>, String, String);
 
 /// Number of messages in the current second.
 #[derive(Default)]
@@ -56,20 +56,23 @@ impl Log {
     pub(crate) fn new(component: &str) -> Self {
         Self {
             component: component.to_string(),
-            last: Mutex::default(),
+            problem: Mutex::default(),
             event: Mutex::default(),
-            instantiates: AtomicBool::new(true),
             pace: Mutex::default(),
         }
     }
 
-    /// Records that the instance is made.
-    pub(crate) fn is_instantiated(&self) {
-        self.instantiates.store(false, Ordering::Relaxed);
+    /// Takes the problem that waits.
+    pub(crate) fn take(&self) -> Option<String> {
+        self.problem.lock().take().map(|(_, _, message)| message)
     }
 
-    pub(crate) fn take(&self) -> Option<String> {
-        self.last.lock().take()
+    /// Prints the problem that waits.
+    pub(crate) fn flush(&self) {
+        let problem = self.problem.lock().take();
+        if let Some((status, category, message)) = problem {
+            self.print(status, &category, &message);
+        }
     }
 
     /// Takes the last message that reports no problem, such as why a simulation ends.
@@ -82,10 +85,12 @@ impl Log {
         let is_problem = !matches!(status, Ok(Status::Ok | Status::Pending | Status::Warning));
         if is_problem {
             page::problem(&message);
+            self.flush();
+            *self.problem.lock() = Some((status, cut(category).into(), message));
+        } else {
+            self.print(status, cut(category), &message);
+            *self.event.lock() = Some(message);
         }
-        self.print(status, cut(category), &message);
-        let place = if is_problem { &self.last } else { &self.event };
-        *place.lock() = Some(message);
     }
 
     fn report_lost(&self, lost: u64) {
@@ -123,9 +128,7 @@ impl Log {
             }
             Ok(Status::Warning) => tracing::warn!("{component}: [{category}] {message}"),
             Ok(Status::Error | Status::Fatal) | Err(_) => {
-                if !self.instantiates.load(Ordering::Relaxed) {
-                    tracing::error!("{component}: [{category}] {message}");
-                }
+                tracing::error!("{component}: [{category}] {message}");
             }
         }
     }
@@ -139,6 +142,7 @@ const _: () = {
 
 impl Drop for Log {
     fn drop(&mut self) {
+        self.flush();
         let lost = self.pace.lock().lost();
         self.report_lost(lost);
     }
@@ -160,7 +164,7 @@ mod tests {
         for number in 0..1000 {
             log.message(Ok(Status::Error), "c", &format!("{number} {}", "é".repeat(2000)));
         }
-        assert_eq!(log.pace.lock().lost(), 1000 - MOST);
+        assert_eq!(log.pace.lock().lost(), 999 - MOST);
         let last = log.take().unwrap();
         assert!(last.starts_with("999 ") && last.len() <= LONGEST && log.take().is_none());
 

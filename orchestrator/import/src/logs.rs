@@ -18,11 +18,7 @@ use std::sync::LazyLock;
 static LIVE: RwLock<BTreeSet<usize>> = RwLock::new(BTreeSet::new());
 
 /// Receives messages whose instance is not known.
-static UNKNOWN: LazyLock<Log> = LazyLock::new(|| {
-    let log = Log::new("an FMU");
-    log.is_instantiated();
-    log
-});
+static UNKNOWN: LazyLock<Log> = LazyLock::new(|| Log::new("an FMU"));
 
 /// A guard: messages find the log by its address as long as this value lives, which must be dropped
 /// before the log.
@@ -76,7 +72,10 @@ fn hand_over(
     } else if crash::with_called(|log| log.message(status, category, message)).is_none() {
         match live.first() {
             Some(only) if live.len() == 1 => at(*only),
-            _ => UNKNOWN.message(status, category, message),
+            _ => {
+                UNKNOWN.message(status, category, message);
+                UNKNOWN.flush();
+            }
         }
     }
 }
