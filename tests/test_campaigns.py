@@ -54,3 +54,17 @@ def test_a_case_by_itself_is_the_case_of_the_campaign(controller, tmp_path):
         metrics = json.loads((tmp_path / str(case) / "metrics.json").read_text())
         for name in ("ems_deg", "cms", "max_rate_deg_s", "max_moment_ratio"):
             assert metrics[name] == table[name][case]
+
+
+@pytest.mark.tier("studies")
+@pytest.mark.parametrize("campaign", ["entry", "entry-told"])
+def test_what_a_campaign_of_entries_disperses_is_what_crmpc_is_told(campaign, tmp_path):
+    """The plant's disturbances and inertia are compared with the declared ones at each step."""
+    path = CAMPAIGNS / f"{campaign}.toml"
+    orchestrator("campaign", path, "--case", "1", "--quiet", "--out", tmp_path / "case", folder=tmp_path)
+    metrics = json.loads((tmp_path / "case" / "metrics.json").read_text())
+    assert metrics["guarantee_share"] == 1.0 and metrics["guarantee_unfounded"] is None
+    other = ["--set", "controller.inertia.tensorError=0.001"]
+    orchestrator("campaign", path, *other, "--case", "1", "--quiet", "--out", tmp_path / "other", folder=tmp_path)
+    metrics = json.loads((tmp_path / "other" / "metrics.json").read_text())
+    assert "plant.inertia.tensorError" in metrics["guarantee_unfounded"]
