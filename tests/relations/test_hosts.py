@@ -142,12 +142,12 @@ def test_a_decimal_comma_changes_nothing(flown, name, tmp_path_factory):
 
 @cache
 def linked_here() -> dict[str, Path]:
-    """The library of each FMU as this system's linker makes it. Shipped libraries for Linux hold an
-    unwinder of their own, which does not know the exceptions of others."""
+    """The newest library of each FMU as this system's linker makes it. Shipped libraries for Linux hold
+    an unwinder of their own, which does not know the exceptions of others."""
     found = {}
     for crate in ("fmu_plant_library", "fmu_optimising", "fmu_feedback"):
         candidates = [TARGET / folder / f"lib{crate}.so" for folder in ("debug", "debug/deps", "release")]
-        for path in filter(Path.is_file, candidates):
+        for path in sorted(filter(Path.is_file, candidates), key=lambda path: path.stat().st_mtime):
             describe = ctypes.CDLL(str(path)).fmu_model_descriptions
             describe.restype = ctypes.c_char_p
             found |= {description["name"]: path for description in json.loads(describe())}
