@@ -68,3 +68,28 @@ def test_what_a_campaign_of_entries_disperses_is_what_crmpc_is_told(campaign, tm
     orchestrator("campaign", path, *other, "--case", "1", "--quiet", "--out", tmp_path / "other", folder=tmp_path)
     metrics = json.loads((tmp_path / "other" / "metrics.json").read_text())
     assert "plant.inertia.tensorError" in metrics["guarantee_unfounded"]
+
+
+def test_a_delay_of_a_case_is_compared_with_the_one_that_crmpc_is_told(tmp_path):
+    campaign = tmp_path / "delays.toml"
+    campaign.write_text(f"""
+title = "Delays that CRMPC is told or not"
+experiment = "{EXPERIMENTS / "crmpc-robust.toml"}"
+cases = 4
+design = "levels"
+metrics = ["guarantee_share", "guarantee_unfounded_at"]
+
+[[vary]]
+parameter = "plant.actuation.delay"
+list = [0.0, 0.02]
+
+[[vary]]
+parameter = "controller.delay"
+list = [0.0, 0.02]
+""")
+    orchestrator("campaign", campaign, "--out", tmp_path / "out", folder=tmp_path)
+    table = pandas.read_parquet(tmp_path / "out" / "cases.parquet")
+    assert (table["guarantee_share"] > 0).sum() >= 3
+    in_force = table[table["guarantee_share"] > 0]
+    told = in_force["plant.actuation.delay"] == in_force["controller.delay"]
+    assert (in_force["guarantee_unfounded_at"].isna() == told).all() and told.sum() == 2

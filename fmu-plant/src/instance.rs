@@ -64,7 +64,8 @@ impl Model for ReentryPlant {
         self.plant = Some(Box::new(Plant::new(&config, context.start_time).map_err(failed)?));
         let nominal = self.vehicle.as_deref().unwrap_or_else(|| Vehicle::papers()).inertia;
         let errors = self.ready()?.body().error_from(&nominal.matrix());
-        self.inertia_errors = errors.unwrap_or_default();
+        let refused = || Failure::Error("the vehicle's inertia is not positive definite".into());
+        self.inertia_errors = errors.ok_or_else(refused)?;
         self.event_driven = false;
         Ok(())
     }

@@ -161,7 +161,7 @@ impl<'a> Outputs<'a> {
         // A panel of a wrong signal is refused before the run, whether it is drawn or not.
         Panel::resolve_all(system)?;
         let watch = (options.page || !options.no_plot).then(|| Watch::new(system)).transpose()?;
-        for doubt in system.doubts() {
+        for doubt in system.doubts(&[]) {
             tracing::warn!("{}", doubt.text);
         }
         let stem = system.experiment.source.path.file_stem();

@@ -45,20 +45,18 @@ fn oracle_what_neither_the_control_moment_nor_inertia_explains_is_the_total_dist
 
 #[test]
 fn oracle_the_error_of_the_inertia_is_the_one_that_made_it() {
-    let errors = |ratios: [f64; 3], scale| {
+    let errors = |product, scale| {
         let mut instance = started(|instance| {
-            let [xx, yy, zz] = ratios;
-            instance.parameters.inertia_ratios = [xx, yy, zz, 0.0, 1.0, 1.0];
+            instance.parameters.inertia_ratios[3] = product;
             instance.parameters.inertia_scale = scale;
         });
         outputs(&mut instance, 0.0).inertia_errors
     };
-    let mut nominal = started(|instance| instance.parameters.inertia_scale = 1.05);
-    let [common, rest] = outputs(&mut nominal, 0.0).inertia_errors;
+    let [common, rest] = errors(1.0, 1.05);
     assert!((common - 0.05).abs() < 1e-15 && rest == 0.0, "{common} {rest}");
-    // Wu's nominal tensor has a product of inertia, which the ratio 0 removes.
+    // The nominal tensor has a product of inertia, which the ratio 0 removes.
     let inertia = Scenario::crmpc2022().inertia;
-    let [common, rest] = errors([1.0; 3], 1.0);
+    let [common, rest] = errors(0.0, 1.0);
     let product = inertia.Ixz / (inertia.Ixx * inertia.Izz).sqrt();
     // The eigenvalues 1/(1 ± p) of the pencil and 1.
     let (least, largest) = (1.0 / (1.0 + product.abs()), 1.0 / (1.0 - product.abs()));

@@ -10,7 +10,7 @@ use crate::signal::{Resolved, Signal, Term};
 use crate::watch::Watched;
 use crate::wiring::Column;
 use fmi_master::clock::Clock;
-use fmi_master::delay::{self, Doubt, FeedbackLoop, Reading};
+use fmi_master::delay::{self, FeedbackLoop, Reading};
 use fmi_master::description::{InterfaceKind, ModelDescription, VariableKind};
 use fmi_master::master::{Master, Member};
 use fmi_master::names;
@@ -200,11 +200,6 @@ impl System {
         let readings =
             delay::readings_of_probes(&self.parts(), &self.wires, &self.probes[place..=place]);
         readings.iter().any(|(_, reading)| *reading == Reading::AfterStep)
-    }
-
-    /// Returns a doubt for each component whose control law is designed for another loop delay.
-    pub fn doubts(&self) -> Vec<Doubt> {
-        delay::doubts(&self.parts(), &self.settings(), &self.loops, self.clock.step())
     }
 
     /// Returns the full names of the probed variables, in the order of a sample's values, and

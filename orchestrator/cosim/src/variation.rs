@@ -5,6 +5,7 @@ use crate::error::Error;
 use crate::interrupt::Interrupt;
 use crate::run::Run;
 use crate::system::System;
+use fmi_master::delay::{self, Doubt};
 use fmi_master::description::{Carrier, Variable, VariableKind};
 use fmi_master::names;
 use fmi_master::quantity;
@@ -117,6 +118,12 @@ impl System {
         run.master.reset()?;
         run.master.set_parameters(&self.varied(changes))?;
         Ok(run.master.initialize()?)
+    }
+
+    /// Returns a doubt for each component whose control law is designed for another loop delay, with
+    /// these changes of the settings.
+    pub fn doubts(&self, changes: &[(Target, SettingValue)]) -> Vec<Doubt> {
+        delay::doubts(&self.parts(), &self.varied(changes), &self.loops, self.clock.step())
     }
 
     /// Returns the settings of all components with the changes made to them.

@@ -225,6 +225,7 @@ fn tell(what: &str) -> bool {
     let called = with_called(|log| write(&["error: ", &log.component]));
     if let (Some(()), Some((_, call))) = (called, CURRENT.get()) {
         write(&[" ended this process in ", call, " (", what, ")"]);
+        with_called(|log| log.with_problem(|problem| write(&["; it said: ", problem])));
     } else {
         let mut names = loaded().map(|fmu| fmu.name.as_str());
         let Some(newest) = names.next() else { return false };

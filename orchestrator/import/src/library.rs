@@ -118,7 +118,10 @@ impl<F: Table> FmuInstance<F> {
     #[inline]
     pub(crate) fn check(&mut self, call: &'static str, status: Result<Status, c_int>) -> Outcome {
         match status {
-            Ok(Status::Ok | Status::Warning) => Ok(()),
+            Ok(Status::Ok | Status::Warning) => {
+                self.data.log.flush();
+                Ok(())
+            }
             status => Err(self.failure(call, status)),
         }
     }

@@ -5,6 +5,7 @@ use crate::isolation::page;
 use crate::warnings;
 use parking_lot::Mutex;
 use std::ffi::c_int;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Largest number of messages of an instance that are printed in a second.
@@ -12,11 +13,13 @@ const MOST: u64 = 100;
 /// Largest number of bytes of a message.
 const LONGEST: usize = 2000;
 
-/// Forwards the log messages of an instance. The last one that reports a problem waits, as it is
-/// part of the error that follows if the call fails.
+/// Forwards the log messages of an instance. The last one that reports a problem waits until the call
+/// returns, as it is part of the error that follows if the call fails.
 pub(crate) struct Log {
     pub(crate) component: String,
     problem: Mutex<Option<Problem>>,
+    /// Whether a problem waits, so that calls need no lock.
+    waits: AtomicBool,
     event: Mutex<Option<String>>,
     pace: Mutex<Pace>,
 }
@@ -57,6 +60,7 @@ impl Log {
         Self {
             component: component.to_string(),
             problem: Mutex::default(),
+            waits: AtomicBool::new(false),
             event: Mutex::default(),
             pace: Mutex::default(),
         }
@@ -67,11 +71,23 @@ impl Log {
         self.problem.lock().take().map(|(_, _, message)| message)
     }
 
-    /// Prints the problem that waits.
+    /// Prints the problem that waits, which has not become part of an error.
+    #[inline]
     pub(crate) fn flush(&self) {
-        let problem = self.problem.lock().take();
-        if let Some((status, category, message)) = problem {
-            self.print(status, &category, &message);
+        if self.waits.load(Ordering::Relaxed) {
+            self.waits.store(false, Ordering::Relaxed);
+            let problem = self.problem.lock().take();
+            if let Some((status, category, message)) = problem {
+                self.print(status, &category, &message);
+            }
+        }
+    }
+
+    /// Hands over the problem that waits, without waiting itself, as a signal handler must not.
+    pub(crate) fn with_problem(&self, function: impl FnOnce(&str)) {
+        let problem = self.problem.try_lock();
+        if let Some((_, _, message)) = problem.as_deref().and_then(Option::as_ref) {
+            function(message);
         }
     }
 
@@ -87,6 +103,7 @@ impl Log {
             page::problem(&message);
             self.flush();
             *self.problem.lock() = Some((status, cut(category).into(), message));
+            self.waits.store(true, Ordering::Relaxed);
         } else {
             self.print(status, cut(category), &message);
             *self.event.lock() = Some(message);
@@ -167,6 +184,10 @@ mod tests {
         assert_eq!(log.pace.lock().lost(), 999 - MOST);
         let last = log.take().unwrap();
         assert!(last.starts_with("999 ") && last.len() <= LONGEST && log.take().is_none());
+
+        log.message(Ok(Status::Error), "c", "of a call that succeeds");
+        log.flush();
+        assert_eq!(log.take(), None, "it is no part of a later failure");
 
         let mut pace = Pace::default();
         let printed = (0..1000).filter(|_| pace.count().0).count() as u64;

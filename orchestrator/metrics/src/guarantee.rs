@@ -6,6 +6,7 @@ use cosim::experiment::{Guarantee, Late};
 use cosim::run::{Observer, Sample};
 use cosim::signal::Resolved;
 use cosim::system::{Probed, System};
+use cosim::variation::{SettingValue, Target};
 
 /// Multiple of the designed time after which an arrival at the reference is late.
 const LATE: f64 = 3.0;
@@ -24,9 +25,8 @@ pub struct GuaranteeSignals {
     /// Signals as multiples of their limits, which must not exceed 1 while the guarantee is in
     /// force.
     pub keeps: Vec<Resolved>,
-    /// Signals that the guarantee assumes not to exceed 1, each with what it says otherwise; none
-    /// for what is wrong at any time.
-    pub assumes: Vec<(String, Option<Resolved>)>,
+    /// Signals, with their texts, that the guarantee assumes not to exceed 1.
+    pub assumes: Vec<(String, Resolved)>,
     /// What counts as a late arrival at the reference.
     pub late: Option<LateSignals>,
 }
@@ -65,9 +65,11 @@ pub struct GuaranteeRecord {
     pub margins: Vec<Option<f64>>,
     /// Whether a limit was exceeded at a tick at which the guarantee was in force.
     pub broken: bool,
-    /// First time at which an assumption did not hold while the guarantee was in force (s), and the
-    /// index of its signal.
-    pub unfounded: Option<(f64, usize)>,
+    /// What is wrong with the delay that the controller is set for, at any time.
+    pub wrong_delay: Option<String>,
+    /// First time at which an assumption did not hold while the guarantee was in force (s), and which
+    /// one.
+    pub unfounded: Option<(f64, String)>,
     /// Time since which the guarantee has been in force and the reference not reached, s.
     away: Option<f64>,
     /// First time at which the arrival at the reference was late, s.
@@ -105,14 +107,8 @@ impl GuaranteeSignals {
         let observe = system.experiment.observe.clone();
         for signal in guarantee.assumes.as_ref().map_or(Ok(&[][..]), |name| observe.list(name))? {
             if !signal.paths().iter().any(|path| is_left_out(path, system)) {
-                signals.assumes.push((format!("{signal} > 1"), Some(system.resolve(signal)?)));
+                signals.assumes.push((format!("{signal} > 1"), system.resolve(signal)?));
             }
-        }
-        if guarantee.assumes.is_some() {
-            let component = guarantee.in_force.split_once('.').map(|(component, _)| component);
-            let wrong = system.doubts().into_iter().filter(|doubt| doubt.certain);
-            let wrong = wrong.filter(|doubt| component == Some(system.names()[doubt.component]));
-            signals.assumes.extend(wrong.map(|doubt| (doubt.text, None)));
         }
         let mut of_list = |name: &Option<String>| {
             let mut found = Vec::new();
@@ -133,6 +129,19 @@ impl GuaranteeSignals {
         }
         Ok(Some(signals))
     }
+}
+
+/// Returns what is wrong with the delay that the controller is set for, if the guarantee of an
+/// experiment with these changes has assumptions.
+pub(crate) fn wrong_delay(
+    guarantee: &Guarantee,
+    system: &System,
+    changes: &[(Target, SettingValue)],
+) -> Option<String> {
+    guarantee.assumes.as_ref()?;
+    let (component, _) = guarantee.in_force.split_once('.')?;
+    let mut doubts = system.doubts(changes).into_iter().filter(|doubt| doubt.certain);
+    Some(doubts.find(|doubt| system.names()[doubt.component] == component)?.text)
 }
 
 impl GuaranteeRecord {
@@ -213,10 +222,10 @@ impl Observer for GuaranteeRecord {
             }
             self.broken |= self.signals.keeps.iter().any(|signal| signal.is_beyond_one(values));
             if self.unfounded.is_none() {
-                let found = self.signals.assumes.iter().position(|(_, signal)| {
-                    signal.as_ref().is_none_or(|signal| signal.is_beyond_one(values))
-                });
-                self.unfounded = found.map(|index| (sample.time, index));
+                let mut assumes = self.signals.assumes.iter();
+                let beyond = assumes.find(|(_, signal)| signal.is_beyond_one(values));
+                let found = beyond.map(|(text, _)| text).or(self.wrong_delay.as_ref());
+                self.unfounded = found.map(|text| (sample.time, text.clone()));
             }
         } else if self.ticks_in_force > 0 && self.lost.is_none() {
             self.lost = Some(GuaranteeLoss { time: sample.time, status: self.status });
@@ -283,26 +292,29 @@ mod tests {
     #[test]
     fn an_error_beyond_the_declared_is_told_only_while_in_force() {
         let error = Resolved { over: Some(2), ..Resolved::difference(1, 3) };
-        let unfounded_with = |third: Option<Resolved>, rows: &[[f64; 4]]| {
+        let record = |rows: &[[f64; 4]], wrong_delay: Option<&str>| {
             let assumes =
-                vec![("other".into(), Some(Resolved::variable(3))), ("error".into(), third)];
+                vec![("other".into(), Resolved::variable(3)), ("error".into(), error.clone())];
             let signals = GuaranteeSignals { assumes, ..GuaranteeSignals::default() };
             let mut record = GuaranteeRecord::new(signals);
+            record.wrong_delay = wrong_delay.map(String::from);
             for (tick, values) in rows.iter().enumerate() {
                 let (tick, time) = (tick as u64, tick as f64);
                 record.observe(&Sample { tick, time, last: false, values }).unwrap();
             }
             record.unfounded
         };
-        let unfounded = |rows: &[[f64; 4]]| unfounded_with(Some(error.clone()), rows);
+        let unfounded = |rows: &[[f64; 4]]| record(rows, None);
+        let error_at = |time| Some((time, "error".to_string()));
         // In force, measured, declared, true: without an error none need be declared.
         assert_eq!(unfounded(&[[1.0, 0.5, 0.0, 0.5], [1.0, 0.5, 0.1, 0.6]]), None);
         assert_eq!(unfounded(&[[0.0, 0.5, 0.0, 0.6], [1.0, 0.5, 0.2, 0.6]]), None);
         let broken = [[1.0, 0.5, 0.2, 0.6], [1.0, 0.5, 0.0, 0.6], [1.0, 0.5, 0.0, 9.0]];
-        assert_eq!(unfounded(&broken), Some((1.0, 1)));
-        assert_eq!(unfounded(&[[1.0, f64::NAN, 1.0, 0.0]]), Some((0.0, 1)));
+        assert_eq!(unfounded(&broken), error_at(1.0));
+        assert_eq!(unfounded(&[[1.0, f64::NAN, 1.0, 0.0]]), error_at(0.0));
         // What is wrong at any time is told when the guarantee comes into force.
-        assert_eq!(unfounded_with(None, &[[0.0; 4], [1.0, 0.0, 0.0, 0.0]]), Some((1.0, 1)));
+        let comes = [[0.0; 4], [1.0, 0.0, 0.0, 0.0]];
+        assert_eq!(record(&comes, Some("delay")), Some((1.0, "delay".into())));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The metrics that an experiment asks for. They are computed during the run, and written to
 //! `metrics.json`.
 
-use crate::guarantee::{GuaranteeRecord, GuaranteeSignals};
+use crate::guarantee::{GuaranteeRecord, GuaranteeSignals, wrong_delay};
 use crate::measure::{self, Gauge};
 use cosim::error::Error;
 use cosim::experiment::{self, Guarantee, Margins, Observe};
@@ -9,6 +9,7 @@ use cosim::pacing::RealTime;
 use cosim::run::{Observer, Sample};
 use cosim::signal::{Resolved, Signal, common_unit};
 use cosim::system::System;
+use cosim::variation::{SettingValue, Target};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -304,7 +305,10 @@ impl Meters {
         let goal = Loss::new("goal", "missed", &observe, observe.goal.as_ref(), system)?;
         let cut_off = system.experiment.given.stop.map(|_| system.clock.ticks());
         let guarantee = (guarantee, record);
-        Ok(Self { gauges, guarantee, loss, goal, cut_off, samples: 0, completed: false })
+        let mut meters =
+            Self { gauges, guarantee, loss, goal, cut_off, samples: 0, completed: false };
+        meters.reset(system, &[]);
+        Ok(meters)
     }
 
     /// Makes the run end when it is lost, and fail when it has missed its goal.
@@ -316,11 +320,13 @@ impl Meters {
         self
     }
 
-    /// Forgets all samples, so that another run of the system can be measured.
-    pub fn reset(&mut self) {
+    /// Forgets all samples, so that another run of the system can be measured, with these changes of
+    /// its settings.
+    pub fn reset(&mut self, system: &System, changes: &[(Target, SettingValue)]) {
         self.gauges.values_mut().flatten().for_each(Gauge::reset);
-        if let Some(record) = &mut self.guarantee.1 {
+        if let (Some(asked), Some(record)) = &mut self.guarantee {
             record.reset();
+            record.wrong_delay = wrong_delay(asked, system, changes);
         }
         for bound in self.loss.iter_mut().chain(&mut self.goal) {
             bound.reset();
@@ -363,9 +369,9 @@ impl Meters {
                     set("broken", Some(Value::Flag(record.broken)));
                 }
                 set("late_at", record.late.map(Value::Number));
-                if let Some((time, index)) = record.unfounded {
-                    set("unfounded", Some(Value::Text(record.signals.assumes[index].0.clone())));
-                    set("unfounded_at", Some(Value::Number(time)));
+                if let Some((time, what)) = &record.unfounded {
+                    set("unfounded", Some(Value::Text(what.clone())));
+                    set("unfounded_at", Some(Value::Number(*time)));
                 }
             }
         }

@@ -136,7 +136,7 @@ impl<'a> Flight<'a> {
         others: &mut [&mut dyn Observer],
     ) -> Result<Flown, Error> {
         let changes = self.sweep.changes(&values);
-        self.meters.reset();
+        self.meters.reset(&self.system, &changes);
         let mut watch = Watch { meters: &mut self.meters, time: None };
         let mut observers: Vec<&mut dyn Observer> = Vec::with_capacity(1 + others.len());
         observers.extend(others.iter_mut().map(|other| &mut **other as &mut dyn Observer));

@@ -6,7 +6,6 @@ use crate::actuators::{Conditions, Drive};
 use crate::axes::AXES;
 use crate::effectors::Surfaces;
 use crate::entry::Prescribed;
-use crate::kinematics::sines;
 use crate::state::State;
 use crate::trajectory::Trajectory;
 use nalgebra::Vector3;
@@ -73,8 +72,7 @@ impl Plant {
     /// Disturbance of the angles' second time derivatives (rad/s²): Δ and the effect R I⁻¹ m of all
     /// moments m (N m) that are not the control moment.
     pub fn total_disturbance(&self, moment: &Vector3<f64>, held: &Held) -> Vector3<f64> {
-        let (matrix, _) = self.kinematics.r_and_inverse(&sines(&self.angles()));
-        held.delta() + matrix * (self.body.inverse * moment)
+        held.delta() + self.kinematics.r(&self.angles()) * (self.body.inverse * moment)
     }
 
     /// Control moment (N m) at the time `elapsed` (s) after the present one, provided that the
