@@ -222,6 +222,9 @@ int fmi2DoStep(Model *model, double time, double step, int no_set_state) {
     if (time + step > model->stop) return complain(model, ERROR, "beyond the stop time:", time + step - model->stop);
 #endif
     model->reached = time + step;
+#ifdef MURMURS
+    complain(model, ERROR, "murmur", time);
+#endif
     if (time >= 2.0 - 1e-9) fault(STEP, model->callbacks->logger, model->callbacks->environment);
     if (time >= model->fail_time - 1e-9) return complain(model, model->fail_status, TROUBLE, time);
     if (model->flag) complain(model, WARNING, "runs hot at", 7.0);

@@ -133,6 +133,24 @@ fn harm_in_the_same_process_names_the_component_and_the_call() {
 }
 
 #[test]
+fn a_problem_is_told_whether_the_call_then_succeeds_or_ends_the_process() {
+    let murmurs = |flags: &[&str]| {
+        let flags = [&["-DMURMURS", "-w"], flags].concat();
+        let bench = Bench::made(LOOP, &Recipe { flags: &flags, ..Recipe::default() });
+        let call = ["run", "loop.toml", "--quiet", "--isolate=false"];
+        let output = bench.command(&call).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    let (code, errors) = murmurs(&[]);
+    let mut told = errors.lines().filter(|line| line.contains("gain: [trouble]"));
+    assert_eq!((code, told.next()), (Some(0), Some("ERROR gain: [trouble] murmur 0")));
+    assert_eq!(told.next(), Some("ERROR gain: [trouble] murmur 1"));
+    let (_, errors) = murmurs(&["-DPLACE=STEP", "-DHOW=ABORT"]);
+    assert_eq!(errors.matches("gain: [trouble] murmur 1").count(), 1, "{errors}");
+    assert!(errors.contains("in doStep (SIGABRT); it said: murmur 2"), "{errors}");
+}
+
+#[test]
 fn harm_by_a_thread_of_an_fmu_names_the_fmus_that_were_loaded() {
     for (how, what, code) in
         [("THREAD_EXIT", "exit", Some(1)), ("THREAD_SEGFAULT", "SIGSEGV", None)]
