@@ -43,7 +43,8 @@ impl Navigation {
     pub(super) fn take_gnss(&self, running: &mut Running, fix: &GnssFix) {
         let planet = &self.settings.planet;
         let noise = &self.settings.fix;
-        if running.clock != 0.0 && running.last.time - running.watches[0].at > FORGOTTEN {
+        let silent = running.last.time - running.watches[0].at;
+        if running.clock != 0.0 && silent > FORGOTTEN {
             // Nobody knows whether a clock that has been wrong still is.
             running.covariance.fill_row(CLOCK, 0.0);
             running.covariance.fill_column(CLOCK, 0.0);
@@ -75,6 +76,9 @@ impl Navigation {
             measured.row[CLOCK] = [over_ground, turning][kind][axis];
             measured
         });
+        if silent > FORGOTTEN {
+            running.hidden[0] = running.hidden[0].max(self.hidden(running, POSITION, &measured));
+        }
         self.judge(running, &measured, Source::Gnss, agrees);
     }
 
@@ -95,10 +99,8 @@ impl Navigation {
         });
         let measured: [Measured; 3] =
             std::array::from_fn(|i| Measured::state(ATTITUDE + i, error[i], noise));
-        if running.misalignment == 0.0 {
-            let of_attitude = running.covariance.diagonal().fixed_rows::<3>(ATTITUDE).max();
-            let squares = self.gate(measured.len()) * measured.len() as f64;
-            running.misalignment = (squares * (of_attitude + noise * noise)).sqrt();
+        if running.hidden[1] == 0.0 {
+            running.hidden[1] = self.hidden(running, ATTITUDE, &measured);
         }
         self.judge(running, &measured, Source::Star, agrees);
     }
@@ -107,6 +109,14 @@ impl Navigation {
     /// is refused. The mean of several departs less from 1 than a single one.
     fn gate(&self, size: usize) -> f64 {
         (self.settings.fix.gate + 3.0 * (size - 1) as f64) / size as f64
+    }
+
+    /// Returns the largest error of three measured states, from `from` on, with which a measurement is
+    /// still taken.
+    fn hidden(&self, running: &Running, from: usize, measured: &[Measured]) -> f64 {
+        let predicted = running.covariance.diagonal().fixed_rows::<3>(from).max();
+        let squares = self.gate(measured.len()) * measured.len() as f64;
+        (squares * (predicted + measured[0].variance)).sqrt()
     }
 
     /// Refuses a measurement of a device that contradicts itself.

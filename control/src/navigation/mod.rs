@@ -21,7 +21,7 @@ mod watch;
 pub use device::Navigation;
 pub use filter::{Covariance, Error, STATES};
 pub use line::{Contradiction, Health, Line};
-pub use settings::{Alignment, Drag, Errors, Fix, Initial, Settings, Trust, Wind};
+pub use settings::{Alignment, Drag, Errors, Fix, Guarded, Initial, Settings, Trust, Wind};
 pub use shown::{Deviations, Protection, Shown};
 pub use strapdown::State;
 
@@ -117,7 +117,7 @@ impl Navigation {
         let felt = Felt { rate: felt.rate + unbiased[0], force: felt.force + unbiased[1] };
         self.show(&mut shown, (time, &state), &felt, wind);
         (memory.health, memory.contradiction) = self.health(running, time, &shown.deviations);
-        shown.protection = self.protection(&shown.deviations, running, memory.health);
+        shown.protection = self.protection(&shown.deviations, running.hidden, memory.health);
         if shown.is_finite() {
             memory.shown = shown;
         } else {

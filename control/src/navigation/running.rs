@@ -31,10 +31,6 @@ const STILL: u32 = 5;
 /// Time since the last sample from which the motion counts as unseen and the navigation as lost,
 /// and a clock that lags is not believed, s.
 pub(super) const UNSEEN_AFTER: f64 = 0.5;
-/// Specific force from which fixes of the motion show the attitude, m/s², and the time in which they
-/// do, s, however many come.
-const SHOWING: f64 = 1.0;
-const SHOWN_IN: f64 = 5.0;
 
 /// State once a sample has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -69,16 +65,15 @@ pub(super) struct Running {
     /// Time of the last fix, and of the last measurement of the air's forces, s.
     pub(super) fixed: f64,
     felt_air: f64,
-    /// Time in which nothing has shown the attitude, s.
-    pub(super) turning: f64,
     /// Measurements of each source so far.
     pub(super) watches: [Watch; 4],
     /// What the receiver has said of its motion, and the error by the last fix of the star tracker
     /// (rad) with its time (s).
     pub(super) heard: Heard,
     pub(super) pointed: Option<(f64, Vector3<f64>)>,
-    /// Largest misalignment of the star tracker that its first fix could hide, rad; 0 before it.
-    pub(super) misalignment: f64,
+    /// Largest offset of the receiver (m) and misalignment of the star tracker (rad) that their first
+    /// fixes could hide; 0 before these.
+    pub(super) hidden: [f64; 2],
     /// Disagreement with the filter of the positions (m) and attitudes (rad) with which it began
     /// anew, and the time of the last such event, s.
     pub(super) doubts: [f64; 2],
@@ -225,11 +220,10 @@ impl Navigation {
             offset: [Error::zeros(); 2],
             fixed: line.time,
             felt_air: line.time,
-            turning: 0.0,
             watches: [Watch::default(); 4],
             heard: Heard::default(),
             pointed: None,
-            misalignment: 0.0,
+            hidden: [0.0; 2],
             doubts: [0.0; 2],
             restarted: f64::NEG_INFINITY,
             surprise: None,
@@ -258,7 +252,6 @@ impl Navigation {
         let before = running.last.fixes;
         (running.state, running.last) = (state, *line);
         running.way.0 += elapsed;
-        running.turning += elapsed;
         running.way.1 += pushed;
         self.decay(running, elapsed);
         self.measure(running, &before);
@@ -345,14 +338,6 @@ impl Navigation {
         source: Source,
     ) {
         let now = running.last.time;
-        let shows = running.last.force.norm() >= SHOWING;
-        // A gap counts as a second.
-        let elapsed = (now - running.fixed).min(1.0);
-        running.turning *= match source {
-            Source::Star => 0.0,
-            Source::Gnss if shows => exp(-elapsed / SHOWN_IN),
-            _ => 1.0,
-        };
         if matches!(source, Source::Gnss | Source::Star) {
             running.fixed = now;
             running.surprise = running.surprise.filter(|(_, at)| now - at < RECOVERY);

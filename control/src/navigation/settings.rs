@@ -50,10 +50,9 @@ pub struct Settings {
     /// When the navigation counts as healthy.
     #[setting(file)]
     pub health: Trust,
-    /// Step of the gyroscope's bias that `protection.attitude` covers, beyond its instability: it
-    /// then grows by this rate while neither stars nor fixes under a force show the attitude.
-    #[setting(name = "protection.gyroscope", unit = "rad/s", min = 0.0, max = 0.1, nominal = 1e-5)]
-    pub guarded: f64,
+    /// Largest steps of the biases, beyond their instability.
+    #[setting(name = "protection")]
+    pub guarded: Guarded,
 }
 
 /// Errors of an inertial sensor that the filter expects.
@@ -159,6 +158,23 @@ pub struct Trust {
     pub after: f64,
 }
 
+/// Largest steps of the biases of the inertial sensors that are to be covered: `deviation.*` and
+/// `protection.*` allow for them, and the filter finds them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Guarded {
+    /// Largest step of the gyroscope's bias that the filter expects.
+    #[setting(unit = "rad/s", min = 0.0, max = 0.1, nominal = 1e-5)]
+    pub gyroscope: f64,
+    /// Largest step of the accelerometer's bias that the filter expects.
+    #[setting(unit = "m/s2", min = 0.0, max = 10.0, nominal = 1e-2)]
+    pub accelerometer: f64,
+}
+
+/// A bias may step at any time. The filter takes it as one that wanders: with a standard deviation of
+/// this share of the step, and a correlation time (s) as long as other sensors do not show it. Drag
+/// and fixes soon show that of the accelerometer.
+const STEPS: [(f64, f64); 2] = [(0.5, 900.0), (0.9, 60.0)];
+
 impl Default for Settings {
     /// Returns the settings for tactical sensors, from the start of the plant's entry flight.
     fn default() -> Self {
@@ -183,7 +199,7 @@ impl Default for Settings {
             drag: Drag { model: 0.15, correlation: 2e4 },
             blend: 3.0,
             health: Trust { deviation: 1_f64.to_radians(), after: 5.0 },
-            guarded: 0.0,
+            guarded: Guarded::default(),
         }
     }
 }
@@ -191,7 +207,7 @@ impl Default for Settings {
 impl Settings {
     /// Returns the errors of gyroscope and accelerometer that the filter expects.
     pub(super) fn errors(&self) -> [Errors; 2] {
-        match self.sensor_set {
+        let mut errors = match self.sensor_set {
             1 => [Errors::default(); 2],
             2 => [self.gyroscope, self.accelerometer],
             set => {
@@ -202,6 +218,16 @@ impl Settings {
                     noise: triad.noise,
                 })
             }
+        };
+        let Guarded { gyroscope, accelerometer } = self.guarded;
+        for ((errors, step), (share, time)) in
+            errors.iter_mut().zip([gyroscope, accelerometer]).zip(STEPS)
+        {
+            if step * share > errors.instability {
+                errors.instability = step * share;
+                errors.correlation = time;
+            }
         }
+        errors
     }
 }

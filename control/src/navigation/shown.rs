@@ -5,7 +5,6 @@ use super::air::Relative;
 use super::device::Navigation;
 use super::filter::{self, Covariance, Error, along};
 use super::line::Health;
-use super::running::Running;
 use super::strapdown::{Felt, State};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -49,9 +48,9 @@ pub struct Deviations {
 
 /// Bounds on the errors that are shown (protection levels), which hold while nothing is suspect.
 ///
-/// They are three of the predicted standard deviations, and for the angles at least one beyond the
-/// largest misalignment of the star tracker that its first fix could hide. While a contradiction
-/// stands, they bound nothing: half a turn, and the radius of the planet. docs/entry.md says how
+/// They are three of the predicted standard deviations, and at least one beyond the largest offset of
+/// the receiver, or misalignment of the star tracker, that its first fix could hide; that of the
+/// receiver is a first one also after half a minute without fixes. While a contradiction stands, they bound nothing: half a turn, and the radius of the planet. docs/entry.md says how
 /// often errors exceed them, without and with faults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Protection {
@@ -188,7 +187,7 @@ impl Navigation {
     pub(super) fn protection(
         &self,
         Deviations { angles, flow, position, .. }: &Deviations,
-        &Running { misalignment, turning, .. }: &Running,
+        hidden: [f64; 2],
         health: Health,
     ) -> Protection {
         let knows = matches!(health, Health::Aided | Health::Bridging | Health::Degraded);
@@ -196,11 +195,13 @@ impl Navigation {
             return self.unprotected();
         }
         let deviation = angles.z.max(flow[0]).max(flow[1]);
-        let hidden = if misalignment > 0.0 { misalignment + deviation } else { 0.0 };
-        let turned = self.settings.guarded * turning;
+        let bound = |predicted: f64, hidden: f64, deviation: f64| {
+            predicted.max(if hidden > 0.0 { hidden + deviation } else { 0.0 })
+        };
+        let of_position = 3_f64.sqrt() * position;
         Protection {
-            attitude: ((PROTECTED * deviation).max(hidden) + turned).min(PI),
-            position: PROTECTED * 3_f64.sqrt() * position,
+            attitude: bound(PROTECTED * deviation, hidden[1], deviation).min(PI),
+            position: bound(PROTECTED * of_position, hidden[0], of_position),
         }
     }
 
