@@ -13,7 +13,7 @@ import pytest
 from conftest import EXPERIMENTS, ROOT, TARGET, program, tomllib
 
 # Commands that take minutes, and those that write outside the folder.
-LONG = ("reproduce", "campaign white", "--worst", "~", "/usr")
+LONG = ("reproduce", "campaign white", "--worst", "--guarantee", "~", "/usr")
 # Runs that the examples of a command take up.
 FLOWN = {"plot": ("lqr", "dlmpc", "crmpc-robust")}
 
