@@ -76,7 +76,8 @@ impl Navigation {
             measured.row[CLOCK] = [over_ground, turning][kind][axis];
             measured
         });
-        if silent > FORGOTTEN {
+        // Of two that disagree, a filter that is suspect is the one that is wrong.
+        if silent > FORGOTTEN && running.surprise.is_none() {
             running.hidden[0] = running.hidden[0].max(self.hidden(running, POSITION, &measured));
         }
         self.judge(running, &measured, Source::Gnss, agrees);
@@ -207,8 +208,10 @@ impl Navigation {
         if now - running.restarted < RECOVERY {
             widen(&mut covariance, if from == ATTITUDE { GYROSCOPE } else { ATTITUDE }..WIND);
         }
-        let doubt = &mut running.doubts[usize::from(from == ATTITUDE)];
-        *doubt = doubt.max(error.fixed_rows::<3>(from).norm());
+        if running.surprise.is_none() {
+            let doubt = &mut running.doubts[usize::from(from == ATTITUDE)];
+            *doubt = doubt.max(error.fixed_rows::<3>(from).norm());
+        }
         running.restarted = now;
         Self::apply(running, &error, &covariance, source);
     }

@@ -28,6 +28,9 @@ const SMALL_TILT: f64 = 2e-4;
 const SMALL_WIND: f64 = 0.5;
 /// Equal samples in a row, with noise on them, that only a frozen sensor gives.
 const STILL: u32 = 5;
+/// Standard deviation of the attitude from which the filter's linear model fails: the air's forces then
+/// show nothing, rad.
+const LINEAR: f64 = 0.1;
 /// Time since the last sample from which the motion counts as unseen and the navigation as lost,
 /// and a clock that lags is not believed, s.
 pub(super) const UNSEEN_AFTER: f64 = 0.5;
@@ -78,8 +81,8 @@ pub(super) struct Running {
     /// anew, and the time of the last such event, s.
     pub(super) doubts: [f64; 2],
     pub(super) restarted: f64,
-    /// Which force of the air has contradicted the filter, and when at last, s: fixes have not borne
-    /// it out since.
+    /// Which force of the air has contradicted the filter, or that the attitude was lost, and when at
+    /// last, s: fixes have not borne it out since.
     pub(super) surprise: Option<(Contradiction, f64)>,
     pub(super) rejected: u32,
     pub(super) innovations: [f64; 4],
@@ -275,8 +278,14 @@ impl Navigation {
         if by_star {
             self.take_star(running, &star);
         }
+        let tilt = running.covariance.diagonal().fixed_rows::<3>(ATTITUDE).max().sqrt();
+        if tilt > LINEAR && running.is_blind()[0] {
+            running.surprise = Some((Contradiction::Gyroscope, time));
+        }
         if by_air {
             running.felt_air = time;
+        }
+        if by_air && tilt < LINEAR {
             for source in [Source::Side, Source::Drag] {
                 let measured = self.by_air(running, source).filter(Measured::is_finite);
                 if let Some(measured) = measured {
