@@ -14,7 +14,7 @@ use vehicle::fault::FaultKind::{
 use vehicle::noise::uniform;
 
 /// Steps of 10°/h and 5 mg.
-const GUARDED: Guarded = Guarded { gyroscope: 4.848e-5, accelerometer: 4.903e-2 };
+const GUARDED: Guarded = Guarded { gyroscope: 4.848e-5, accelerometer: 4.903e-2, clock: 0.2 };
 
 fn main() {
     let flights = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(20);

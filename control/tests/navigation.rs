@@ -201,7 +201,8 @@ fn a_step_of_the_bias_is_covered_if_it_is_guarded_against() {
         let mut case = faulty(2, kind, 0.1, [start, start + 600.0], seed);
         let (without, _) = judged(&case);
         // 10°/h and 5 mg, as the fault.
-        case.settings.guarded = Guarded { gyroscope: 4.848e-5, accelerometer: 4.903e-2 };
+        case.settings.guarded =
+            Guarded { gyroscope: 4.848e-5, accelerometer: 4.903e-2, clock: 0.2 };
         let (with, [_, unsaid]) = judged(&case);
         assert!(with[0] < 0.02 && with[0] < 0.2 * without[0], "{seed}: {without:?}, {with:?}");
         assert!(with[1] == 0.0 && unsaid == 0, "{seed}: {with:?}, {unsaid}");

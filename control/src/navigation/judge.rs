@@ -13,11 +13,12 @@ use super::filter::{
 use super::line::Contradiction;
 use super::running::{Running, Source};
 use super::strapdown::{State, rotation};
-use super::watch::{DEPARTURE, FORGOTTEN, Heard, RECOVERY, RUN};
+use super::watch::{DEPARTURE, FORGOTTEN, RECOVERY, RUN};
 use nalgebra::Vector3;
 use std::ops::Range;
 use vehicle::fixes::{GnssFix, StarFix};
 use vehicle::frames::fixed_from_inertial;
+use vehicle::math::hypot;
 
 /// Greatest offset of the receiver's clock that is estimated, and greatest time by which a state is
 /// extrapolated to that of a measurement, s.
@@ -44,17 +45,22 @@ impl Navigation {
         let planet = &self.settings.planet;
         let noise = &self.settings.fix;
         let silent = running.last.time - running.watches[0].at;
-        if running.clock != 0.0 && silent > FORGOTTEN {
+        // The initial position tells an offset of the clock from a wrong one.
+        if silent > FORGOTTEN && silent.is_finite() {
             // Nobody knows whether a clock that has been wrong still is.
+            let deviation = running.clock.abs().max(self.settings.guarded.clock / 2.0);
             running.covariance.fill_row(CLOCK, 0.0);
             running.covariance.fill_column(CLOCK, 0.0);
-            running.covariance[(CLOCK, CLOCK)] = running.clock * running.clock;
+            running.covariance[(CLOCK, CLOCK)] = deviation * deviation;
         }
-        let time = fix.time + running.clock;
-        let to_inertial = fixed_from_inertial(planet, time).transpose();
-        let position = to_inertial * fix.position;
-        let velocity = to_inertial * fix.velocity + rotation(planet).cross(&position);
-        let agrees = running.heard.agrees((time, position, velocity), noise.position);
+        let inertial = |time: f64| {
+            let to_inertial = fixed_from_inertial(planet, time).transpose();
+            let position = to_inertial * fix.position;
+            (time, position, to_inertial * fix.velocity + rotation(planet).cross(&position))
+        };
+        // By its own clock, whatever that is found to be.
+        let agrees = running.heard.agrees(inertial(fix.time), noise.position);
+        let (time, position, velocity) = inertial(fix.time + running.clock);
         let (radius, speed) = (position.norm() / planet.radius, velocity.norm());
         let circular = (planet.gravitation / planet.radius).sqrt();
         let is_plausible = radius > 0.9 && radius < 2.0 && speed < 2.0 * circular;
@@ -92,12 +98,24 @@ impl Navigation {
         let error = (seen.inverse() * then.attitude.inverse()).scaled_axis();
         let noise = self.settings.fix.attitude;
         let before = running.pointed.replace((fix.time, error));
+        let turned = |(time, before): (f64, Vector3<f64>)| {
+            (fix.time - time, (error - before).norm() - 2.0 * DEPARTURE[0] * noise)
+        };
         // What the gyroscope makes of the difference of two fixes is small within seconds.
-        let agrees = before.is_none_or(|(time, before)| {
-            let elapsed = fix.time - time;
-            elapsed > FORGOTTEN
-                || elapsed > 0.0 && (error - before).norm() <= 2.0 * DEPARTURE[0] * noise
-        });
+        let goes_on = before
+            .map(turned)
+            .is_none_or(|(elapsed, beyond)| elapsed > FORGOTTEN || elapsed > 0.0 && beyond <= 0.0);
+        // The gyroscope does not jump: a star tracker that does is wrong until it has jumped back.
+        if !goes_on {
+            let drift = self.errors[0].instability;
+            running.steady = running.steady.or(before).filter(|steady| {
+                let (elapsed, beyond) = turned(*steady);
+                beyond > drift * elapsed
+            });
+        }
+        let agrees = goes_on && running.steady.is_none();
+        let by_clock = self.settings.guarded.clock * running.felt(&running.last).rate.norm();
+        let noise = hypot(noise, by_clock);
         let measured: [Measured; 3] =
             std::array::from_fn(|i| Measured::state(ATTITUDE + i, error[i], noise));
         if running.hidden[1] == 0.0 {
@@ -124,7 +142,7 @@ impl Navigation {
     fn refuse(running: &mut Running, source: Source) {
         running.rejected += 1;
         let watch = &mut running.watches[source as usize];
-        (watch.agreed, watch.refused, watch.jumped) = (0, 0, true);
+        (watch.agreed, watch.refused) = (0, 0);
     }
 
     /// Corrects the filter by measurements, unless they contradict it or their device itself.
@@ -154,7 +172,7 @@ impl Navigation {
         }
         let gate = self.gate(size);
         if squares <= gate {
-            (watch.refused, watch.jumped) = (0, false);
+            watch.refused = 0;
             Self::apply(running, &error, &covariance, source);
             return;
         }
@@ -164,12 +182,9 @@ impl Navigation {
             return;
         }
         watch.refused = 0;
-        let has_jumped = watch.jumped;
         match source {
             Source::Gnss if Self::explain_by_clock(running, measured, gate) => {}
             Source::Gnss => Self::restart(running, measured, POSITION, source),
-            // The gyroscope does not jump: a star tracker that does is wrong, and not the filter.
-            Source::Star if has_jumped => {}
             Source::Star => Self::restart(running, measured, ATTITUDE, source),
             Source::Side => widen(&mut running.covariance, WIND..DRAG),
             Source::Drag => widen(&mut running.covariance, DRAG..CLOCK),
@@ -183,7 +198,6 @@ impl Navigation {
         let (error, covariance, squares) = updated(&open, measured);
         let explains = squares <= gate && (running.clock + error[CLOCK]).abs() <= CLOCK_RANGE;
         if explains {
-            running.heard = Heard::default();
             Self::apply(running, &error, &covariance, Source::Gnss);
         }
         explains

@@ -70,10 +70,11 @@ pub(super) struct Running {
     felt_air: f64,
     /// Measurements of each source so far.
     pub(super) watches: [Watch; 4],
-    /// What the receiver has said of its motion, and the error by the last fix of the star tracker
-    /// (rad) with its time (s).
+    /// What the receiver has said of its motion; the errors by the last fix of the star tracker, and by
+    /// the last one before it jumped (rad), with their times (s).
     pub(super) heard: Heard,
     pub(super) pointed: Option<(f64, Vector3<f64>)>,
+    pub(super) steady: Option<(f64, Vector3<f64>)>,
     /// Largest offset of the receiver (m) and misalignment of the star tracker (rad) that their first
     /// fixes could hide; 0 before these.
     pub(super) hidden: [f64; 2],
@@ -226,6 +227,7 @@ impl Navigation {
             watches: [Watch::default(); 4],
             heard: Heard::default(),
             pointed: None,
+            steady: None,
             hidden: [0.0; 2],
             doubts: [0.0; 2],
             restarted: f64::NEG_INFINITY,
@@ -361,7 +363,7 @@ impl Navigation {
         running.side += error[SIDE];
         running.drag += error[DRAG];
         running.clock += error[CLOCK];
-        if let Some((_, pointed)) = &mut running.pointed {
+        for (_, pointed) in [&mut running.pointed, &mut running.steady].into_iter().flatten() {
             *pointed -= part(ATTITUDE);
         }
         // A corrected altitude is no climb through another wind.

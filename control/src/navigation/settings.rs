@@ -168,6 +168,10 @@ pub struct Guarded {
     /// Largest step of the accelerometer's bias that the filter expects.
     #[setting(unit = "m/s2", min = 0.0, max = 10.0, nominal = 1e-2)]
     pub accelerometer: f64,
+    /// Largest offset of the clocks of star tracker and receiver that the filter expects, the latter
+    /// after half a minute without fixes.
+    #[setting(unit = "s", min = 0.0, max = 0.25, nominal = 0.1)]
+    pub clock: f64,
 }
 
 /// A bias may step at any time. The filter takes it as one that wanders: with a standard deviation of
@@ -219,7 +223,7 @@ impl Settings {
                 })
             }
         };
-        let Guarded { gyroscope, accelerometer } = self.guarded;
+        let Guarded { gyroscope, accelerometer, .. } = self.guarded;
         for ((errors, step), (share, time)) in
             errors.iter_mut().zip([gyroscope, accelerometer]).zip(STEPS)
         {

@@ -30,8 +30,6 @@ pub(super) struct Watch {
     /// Number in a row that contradicted the filter, and that agreed among themselves.
     pub(super) refused: u32,
     pub(super) agreed: u32,
-    /// Whether the device has contradicted itself since it last agreed with the filter.
-    pub(super) jumped: bool,
     /// Averages of the squares of the normalised innovations per component over [`WINDOWS`].
     averages: [f64; 3],
     /// Averages of single normalised innovations themselves, over the longer ones of these.
@@ -46,7 +44,6 @@ impl Default for Watch {
             at: f64::NEG_INFINITY,
             refused: 0,
             agreed: RUN,
-            jumped: false,
             averages: [1.0; 3],
             means: [0.0; 2],
             size: 1,
