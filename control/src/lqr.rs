@@ -5,12 +5,12 @@ use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::{DesignError, positive};
 use crate::error_dynamics::{Gain, SampledError};
 use crate::linearise;
+use crate::sliding::tracking_error;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::Declared;
 use vehicle::axes::{NUMBERED_ANGLES, NUMBERED_STATE};
 use vehicle::dynamics::RigidBody;
-use vehicle::kinematics;
 
 /// Settings of the regulator. Units SI, angles rad.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
@@ -98,11 +98,10 @@ impl Controller for Lqr {
         reference: ReferenceAt,
     ) -> Vector3<f64> {
         let reference = reference(time);
-        let angle_rates = kinematics::r(&measured.angles) * measured.rates;
+        let (error, angle_rates) = tracking_error(measured, &reference);
         let mut acceleration = reference.accelerations;
         for (i, gain) in self.gains.iter().enumerate() {
-            acceleration[i] += gain.k1 * (measured.angles[i] - reference.angles[i])
-                + gain.k2 * (angle_rates[i] - reference.rates[i]);
+            acceleration[i] += gain.k1 * error.angles[i] + gain.k2 * error.rates[i];
         }
         linearise::moment(&self.settings.body, &measured.angles, &angle_rates, &acceleration)
     }
@@ -113,6 +112,7 @@ mod tests {
     use super::*;
     use crate::crmpc::{Constraints, Settings};
     use nalgebra::{Matrix2, Vector2};
+    use vehicle::kinematics;
     use vehicle::reference::Reference;
 
     #[test]

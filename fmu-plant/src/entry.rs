@@ -30,19 +30,15 @@ pub(crate) struct VehicleFile {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub(crate) struct EntryParameters {
     pub(crate) translation: Translation,
-    #[setting(name = "initial")]
-    #[setting(used_with = "translation = entry")]
+    #[setting(name = "initial", used_with = "translation = entry")]
     pub(crate) start: Start,
     #[setting(used_with = "translation = entry")]
     pub(crate) planet: Planet,
-    #[setting(name = "aerodynamics.trim")]
-    #[setting(used_with = "translation = entry")]
+    #[setting(name = "aerodynamics.trim", used_with = "translation = entry")]
     pub(crate) trim: Trim,
-    #[setting(name = "aerodynamics")]
-    #[setting(used_with = "translation = entry")]
+    #[setting(name = "aerodynamics", used_with = "translation = entry")]
     pub(crate) deviations: Deviations,
-    #[setting(name = "")]
-    #[setting(used_with = "translation = entry")]
+    #[setting(name = "", used_with = "translation = entry")]
     pub(crate) air: Air,
     #[setting(used_with = "translation = entry")]
     pub(crate) prescribed: Following,

@@ -60,8 +60,7 @@ pub(crate) struct Parameters {
     #[setting(used_with = "disturbance.kind = white or alongRate or againstMoment")]
     pub(crate) period: f64,
     /// Seed of the white noise; the same seed gives the same noise.
-    #[setting(name = "disturbance.seed", min = 0)]
-    #[setting(used_with = "disturbance.kind = white")]
+    #[setting(name = "disturbance.seed", min = 0, used_with = "disturbance.kind = white")]
     pub(crate) seed: u64,
     /// Factor on disturbance.bound.
     #[setting(name = "disturbance.direction", each = ANGLES, min = -1, max = 1, nominal = 1)]
@@ -76,16 +75,13 @@ pub(crate) struct Parameters {
     #[setting(used_with = "disturbance.kind = sine")]
     pub(crate) sine_offset: Vector3<f64>,
     /// Sinusoidal part of the sine disturbance moment.
-    #[setting(name = "disturbance.sine", each = WAVES)]
-    #[setting(used_with = "disturbance.kind = sine")]
+    #[setting(name = "disturbance.sine", each = WAVES, used_with = "disturbance.kind = sine")]
     pub(crate) waves: [MomentWave; 2],
     /// Time at which the disturbance starts.
-    #[setting(name = "disturbance.start", unit = "s")]
-    #[setting(used_with = "disturbance.kind != none")]
+    #[setting(name = "disturbance.start", unit = "s", used_with = "disturbance.kind != none")]
     pub(crate) start: f64,
     /// Time at which the disturbance ends.
-    #[setting(name = "disturbance.end", unit = "s")]
-    #[setting(used_with = "disturbance.kind != none")]
+    #[setting(name = "disturbance.end", unit = "s", used_with = "disturbance.kind != none")]
     pub(crate) end: f64,
     /// Maximum step size of the Runge-Kutta integration.
     #[setting(name = "integrator.step", unit = "s", min = 1e-5, max = 1.0, nominal = 0.01)]
@@ -103,13 +99,11 @@ pub(crate) struct Parameters {
     pub(crate) aerodynamics_scale: f64,
     /// If true, jets give any thrust from 0 to 1; if false, they are fully on from a command of
     /// 0.5.
-    #[setting(name = "jets.duty")]
-    #[setting(used_with = "actuation = surfacesAndJets")]
+    #[setting(name = "jets.duty", used_with = "actuation = surfacesAndJets")]
     pub(crate) jet_duty: bool,
     /// If true, jet 4 mirrors jet 8; if false, it is as printed in (64) of Wu 2015, which is not
     /// symmetric.
-    #[setting(name = "jets.symmetric")]
-    #[setting(used_with = "actuation = surfacesAndJets")]
+    #[setting(name = "jets.symmetric", used_with = "actuation = surfacesAndJets")]
     pub(crate) jet_symmetric: bool,
     #[setting(name = "effector.fault", used_with = "actuation = surfacesAndJets")]
     pub(crate) effector_fault: EffectorFault,

@@ -107,8 +107,7 @@ pub(crate) struct Output {
     pub(crate) deflection_rates: Surfaces,
     #[setting(skip)]
     pub(crate) indicators: SVector<f64, INDICATORS>,
-    #[setting(name = "")]
-    #[setting(depends_on = ["attitude.*", "rate.*", "trajectory.*", "motion.*"])]
+    #[setting(name = "", depends_on = ["attitude.*", "rate.*", "trajectory.*", "motion.*"])]
     pub(crate) measured: Sample,
     /// {}.
     #[setting(each = MOTION_NAMES, units = UNITS, nominals = NOMINALS)]

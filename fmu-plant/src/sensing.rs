@@ -35,8 +35,7 @@ pub(crate) struct Sensing {
         used_with = "sensor.set >= 1 and (sensor.set >= 2 or sensor.drop.probability > 0 or translation = entry)"
     )]
     pub(crate) sensor_seed: u64,
-    #[setting(name = "sensor")]
-    #[setting(used_with = "sensor.set >= 1")]
+    #[setting(name = "sensor", used_with = "sensor.set >= 1")]
     pub(crate) devices: Devices,
     #[setting(name = "sensor")]
     pub(crate) triads: PerSensor<Triad>,

@@ -87,13 +87,11 @@ pub struct MomentWave {
     #[setting(part, each = AXES, unit = "N.m", nominal = 1e4)]
     pub amplitude: Vector3<f64>,
     /// Angular frequency.
-    #[setting(part, unit = "rad/s", min = 0.0, nominal = 1.0)]
-    #[setting(used_with = "~.amplitude.* != 0")]
+    #[setting(part, unit = "rad/s", min = 0.0, nominal = 1.0, used_with = "~.amplitude.* != 0")]
     pub frequency: f64,
     /// Phase at time 0.
     #[serde(default)]
-    #[setting(part, unit = "rad", nominal = 1.0)]
-    #[setting(used_with = "~.amplitude.* != 0")]
+    #[setting(part, unit = "rad", nominal = 1.0, used_with = "~.amplitude.* != 0")]
     pub phase: f64,
 }
 

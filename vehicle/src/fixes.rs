@@ -33,13 +33,10 @@ pub struct Gnss {
     #[setting(file)]
     pub velocity_noise: f64,
     /// Altitude at which the plasma begins to hold back the signals; it ends at blackout.bottom.
-    #[setting(name = "blackout.top", unit = "m", nominal = 1e5)]
-    #[setting(used_with = "~.period > 0")]
-    #[setting(file)]
+    #[setting(name = "blackout.top", unit = "m", nominal = 1e5, used_with = "~.period > 0", file)]
     pub blackout_top: f64,
     /// Altitude below which the signals are received again.
-    #[setting(name = "blackout.bottom", unit = "m", nominal = 1e5)]
-    #[setting(used_with = "~.period > 0")]
+    #[setting(name = "blackout.bottom", unit = "m", nominal = 1e5, used_with = "~.period > 0")]
     #[setting(file)]
     pub blackout_bottom: f64,
     /// Fault of the receiver: {}
@@ -54,14 +51,10 @@ pub struct StarTracker {
     #[setting(unit = "s", min = 0.0, nominal = 1.0)]
     pub period: f64,
     /// Standard deviation of the attitude of a fix, about each axis.
-    #[setting(unit = "rad", min = 0.0, nominal = 1e-4)]
-    #[setting(used_with = "~.period > 0")]
-    #[setting(file)]
+    #[setting(unit = "rad", min = 0.0, nominal = 1e-4, used_with = "~.period > 0", file)]
     pub noise: f64,
     /// Altitude above which the star tracker sees stars.
-    #[setting(name = "altitude", unit = "m", nominal = 1e5)]
-    #[setting(used_with = "~.period > 0")]
-    #[setting(file)]
+    #[setting(name = "altitude", unit = "m", nominal = 1e5, used_with = "~.period > 0", file)]
     pub least_altitude: f64,
     /// Fault of the star tracker: {}
     #[setting(used_with = "~.period > 0")]

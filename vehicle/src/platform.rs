@@ -21,12 +21,10 @@ pub type Readings = [Vector3<f64>; 3];
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Surroundings {
     /// Gravitational acceleration at the accelerometer, directed down.
-    #[setting(unit = "m/s2", min = 0.0, nominal = 10.0)]
-    #[setting(file)]
+    #[setting(unit = "m/s2", min = 0.0, nominal = 10.0, file)]
     pub gravity: f64,
     /// Earth's magnetic field at the magnetometer.
-    #[setting(each = LEVEL, unit = "T", nominal = 5e-5)]
-    #[setting(file)]
+    #[setting(each = LEVEL, unit = "T", nominal = 5e-5, file)]
     pub field: Vector3<f64>,
 }
 

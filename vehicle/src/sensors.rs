@@ -76,12 +76,10 @@ pub struct Config {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Line {
     /// Sampling period of the sensors.
-    #[setting(unit = "s", min = 1e-4, nominal = 0.01)]
-    #[setting(used_with = "sensor.set >= 1")]
+    #[setting(unit = "s", min = 1e-4, nominal = 0.01, used_with = "sensor.set >= 1")]
     pub period: f64,
     /// Delay between taking a sample and receiving it.
-    #[setting(unit = "s", min = 0.0, max = 10.0, nominal = 0.01)]
-    #[setting(used_with = "sensor.set >= 1")]
+    #[setting(unit = "s", min = 0.0, max = 10.0, nominal = 0.01, used_with = "sensor.set >= 1")]
     pub delay: f64,
     /// Probability that a sample is dropped in transmission.
     ///
@@ -90,8 +88,7 @@ pub struct Line {
     #[setting(used_with = "sensor.set >= 1")]
     pub drop_probability: f64,
     /// Time window in which samples can be dropped.
-    #[setting(name = "drop")]
-    #[setting(used_with = "sensor.set >= 1 and sensor.drop.probability > 0")]
+    #[setting(name = "drop", used_with = "sensor.set >= 1 and sensor.drop.probability > 0")]
     pub drop_window: Window,
 }
 

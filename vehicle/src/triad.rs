@@ -14,25 +14,17 @@ use std::f64::consts::TAU;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Triad {
     /// Matrix of scale and misalignment; for the magnetometer with soft iron.
-    #[setting(part, unit = "1", nominal = 1.0)]
-    #[setting(used_with = "sensor.set = 2")]
-    #[setting(file)]
+    #[setting(part, unit = "1", nominal = 1.0, used_with = "sensor.set = 2", file)]
     pub matrix: Matrix3<f64>,
     /// Bias; for the magnetometer with hard iron.
-    #[setting(part, each = AXES)]
-    #[setting(used_with = "sensor.set = 2")]
-    #[setting(file)]
+    #[setting(part, each = AXES, used_with = "sensor.set = 2", file)]
     pub bias: Vector3<f64>,
     /// Rate of change of the bias.
-    #[setting(part, rate, each = AXES)]
-    #[setting(used_with = "sensor.set = 2")]
-    #[setting(file)]
+    #[setting(part, rate, each = AXES, used_with = "sensor.set = 2", file)]
     pub drift: Vector3<f64>,
     /// Standard deviation of a random part of the bias, which wanders: a Gauss-Markov process that
     /// is stationary from the start.
-    #[setting(part, min = 0.0)]
-    #[setting(used_with = "sensor.set = 2")]
-    #[setting(file)]
+    #[setting(part, min = 0.0, used_with = "sensor.set = 2", file)]
     pub instability: f64,
     /// Correlation time of the wandering bias; 0 for one that stays.
     #[setting(part, unit = "s", min = 0.0, nominal = 1e3)]
@@ -40,28 +32,19 @@ pub struct Triad {
     #[setting(file)]
     pub correlation: f64,
     /// Standard deviation of the white noise on the samples.
-    #[setting(part, min = 0.0)]
-    #[setting(used_with = "sensor.set = 2")]
-    #[setting(file)]
+    #[setting(part, min = 0.0, used_with = "sensor.set = 2", file)]
     pub noise: f64,
     /// Bandwidth (3 dB) of the first-order low-pass filter; 0 for no filter.
-    #[setting(part, unit = "Hz", min = 0.0, nominal = 50.0)]
-    #[setting(used_with = "sensor.set = 2")]
-    #[setting(file)]
+    #[setting(part, unit = "Hz", min = 0.0, nominal = 50.0, used_with = "sensor.set = 2", file)]
     pub bandwidth: f64,
     /// Largest magnitude of a reading; 0 for no limit.
-    #[setting(part, min = 0.0)]
-    #[setting(used_with = "sensor.set = 2")]
-    #[setting(file)]
+    #[setting(part, min = 0.0, used_with = "sensor.set = 2", file)]
     pub range: f64,
     /// Quantization step of the reading; 0 for none.
-    #[setting(part, min = 0.0)]
-    #[setting(used_with = "sensor.set = 2")]
-    #[setting(file)]
+    #[setting(part, min = 0.0, used_with = "sensor.set = 2", file)]
     pub resolution: f64,
     /// Time window in which the sensor repeats its last value.
-    #[setting(part)]
-    #[setting(used_with = "sensor.set >= 1")]
+    #[setting(part, used_with = "sensor.set >= 1")]
     pub freeze: Window,
 }
 

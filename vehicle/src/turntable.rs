@@ -22,8 +22,7 @@ use std::f64::consts::TAU;
 pub struct Config {
     /// Bandwidth of the first-order servo of a turntable that carries the sampled sensors; 0 for
     /// sensors on the vehicle.
-    #[setting(unit = "Hz", min = 0.0, nominal = 10.0)]
-    #[setting(used_with = "sensor.set >= 1")]
+    #[setting(unit = "Hz", min = 0.0, nominal = 10.0, used_with = "sensor.set >= 1")]
     pub bandwidth: f64,
     /// Maximum rate of the turntable's angles; 0 for no limit.
     #[setting(unit = "rad/s", min = 0.0, nominal = 1.0)]

@@ -136,10 +136,6 @@ impl Paper {
 }
 
 impl Bounded<2> for Paper {
-    fn constrains_states(&self) -> bool {
-        true
-    }
-
     fn norm_constraints(
         &self,
         k: usize,

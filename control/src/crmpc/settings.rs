@@ -117,8 +117,7 @@ pub struct Settings {
     #[setting(file)]
     pub terminal: Gain,
     /// Gain for the paper's tube constant in (21).
-    #[setting(used_with = "constraints = paper")]
-    #[setting(file)]
+    #[setting(used_with = "constraints = paper", file)]
     pub tube: Gain,
     /// Bound on each component of the disturbance of the angles' second derivatives; the
     /// constraint sets are tightened for it.
@@ -223,8 +222,7 @@ pub struct Settings {
     #[setting(used_with = "constraints = robust")]
     pub disturbance_parts: usize,
     #[allow(missing_docs)]
-    #[setting(name = "guarantee.policy")]
-    #[setting(used_with = "constraints = robust")]
+    #[setting(name = "guarantee.policy", used_with = "constraints = robust")]
     pub guarantee: Guarantee,
     /// Largest magnitude of the sideslip angle for which the guarantee is given.
     #[setting(name = "guarantee.sideslip", unit = "rad", min = 0.0, max = 0.8, nominal = 0.3)]

@@ -46,20 +46,17 @@ pub struct Settings {
     #[allow(missing_docs)]
     pub kinematics: Kinematics,
     /// Direction of the horizontal magnetic field relative to the velocity, positive to the east.
-    #[setting(name = "field.declination", unit = "rad", nominal = 0.1)]
-    #[setting(file)]
+    #[setting(name = "field.declination", unit = "rad", nominal = 0.1, file)]
     pub declination: f64,
     /// Time from the first sample during which the platform rests and the gyroscope's bias is
     /// measured; 0 for none.
-    #[setting(name = "rest.duration", unit = "s", min = 0.0, nominal = 1.0)]
-    #[setting(file)]
+    #[setting(name = "rest.duration", unit = "s", min = 0.0, nominal = 1.0, file)]
     pub rest_duration: f64,
     /// Sampling period of the estimator and of the sensors.
     #[setting(unit = "s", min = 1e-4, max = 10.0, nominal = 0.01)]
     pub period: f64,
     /// Cut-off frequency of the low-pass filter on all readings; 0 for no filter.
-    #[setting(name = "filter.cutoff", unit = "Hz", min = 0.0, nominal = 10.0)]
-    #[setting(file)]
+    #[setting(name = "filter.cutoff", unit = "Hz", min = 0.0, nominal = 10.0, file)]
     pub cutoff: f64,
     /// Whether the estimate is predicted forward over the delays of sensors, transmission and
     /// filter.
@@ -69,29 +66,24 @@ pub struct Settings {
     #[setting(used_with = "sensor.set = 2")]
     pub sensor_delay: f64,
     /// Gains of the nine-axis fusion.
-    #[setting(name = "fusion")]
-    #[setting(file)]
+    #[setting(name = "fusion", file)]
     pub gains: Gains,
     /// Time without a usable sample after which the attitude counts as lost.
-    #[setting(name = "lost.after", unit = "s", above = 0.0, nominal = 0.5)]
-    #[setting(file)]
+    #[setting(name = "lost.after", unit = "s", above = 0.0, nominal = 0.5, file)]
     pub lost_after: f64,
     /// Number of equal readings in a row from which a sensor counts as frozen; 0 for never, as
     /// needed for sensors without noise.
-    #[setting(name = "frozen.samples", min = 0)]
-    #[setting(file)]
+    #[setting(name = "frozen.samples", min = 0, file)]
     pub frozen_samples: u32,
     /// Gates for the readings.
-    #[setting(name = "")]
-    #[setting(file)]
+    #[setting(name = "", file)]
     pub gates: PerSensor<Gate>,
     /// Sensor set, the same as in the plant: 0 and 1 are sensors without errors; 2 uses
     /// sensor.delay and the correction matrices and biases, by default those of the MEMS set.
     #[setting(name = "sensor.set", min = 0, max = MEMS_SENSORS)]
     pub sensor_set: i32,
     #[allow(missing_docs)]
-    #[setting(name = "calibration.mode")]
-    #[setting(file)]
+    #[setting(name = "calibration.mode", file)]
     pub calibration: CalibrationMode,
     /// Time during which readings are collected for the fit.
     #[setting(name = "calibration.duration", unit = "s", above = 0.0, nominal = 10.0)]
@@ -99,9 +91,7 @@ pub struct Settings {
     #[setting(file)]
     pub calibration_duration: f64,
     /// Corrections of the readings.
-    #[setting(name = "")]
-    #[setting(used_with = "sensor.set = 2")]
-    #[setting(file)]
+    #[setting(name = "", used_with = "sensor.set = 2", file)]
     pub corrections: PerSensor<Correction>,
 }
 

@@ -54,12 +54,10 @@ pub struct Target {
     #[setting(unit = "m", above = 0.0, nominal = 1e3)]
     pub tolerance: f64,
     /// Altitude at which the flight is to end.
-    #[setting(unit = "m", min = 0.0, nominal = 1e4)]
-    #[setting(file)]
+    #[setting(unit = "m", min = 0.0, nominal = 1e4, file)]
     pub altitude: f64,
     /// Speed at which the flight is to end.
-    #[setting(unit = "m/s", above = 0.0, nominal = 1e3)]
-    #[setting(file)]
+    #[setting(unit = "m/s", above = 0.0, nominal = 1e3, file)]
     pub speed: f64,
 }
 
@@ -175,16 +173,13 @@ pub struct Limit {
     #[setting(unit = "Pa", above = 0.0, nominal = 1e4)]
     pub pressure: f64,
     /// Share of each limit that is kept in reserve.
-    #[setting(min = 0.0, max = 0.5, nominal = 0.1)]
-    #[setting(file)]
+    #[setting(min = 0.0, max = 0.5, nominal = 0.1, file)]
     pub margin: f64,
     /// Time constant with which a limit is approached.
-    #[setting(unit = "s", above = 0.0, nominal = 10.0)]
-    #[setting(file)]
+    #[setting(unit = "s", above = 0.0, nominal = 10.0, file)]
     pub time: f64,
     /// Change of the cosine of the bank angle with the altitude rate at a limit.
-    #[setting(unit = "s/m", min = 0.0, nominal = 1e-2)]
-    #[setting(file)]
+    #[setting(unit = "s/m", min = 0.0, nominal = 1e-2, file)]
     pub gain: f64,
 }
 

@@ -60,7 +60,9 @@ impl Cells<'_> {
 /// The constraints of a controller: norm constraints whose bounds are a function of the trajectory.
 pub trait Bounded<const O: usize> {
     /// Returns whether the states have norm constraints.
-    fn constrains_states(&self) -> bool;
+    fn constrains_states(&self) -> bool {
+        true
+    }
 
     /// Returns the norm constraints of stage `k` at (E_k, v_k) with these bounds on state and
     /// input, and with their derivatives.

@@ -22,8 +22,7 @@ pub struct SolverSettings {
     #[setting(name = "")]
     pub method: Method,
     /// Maximum number of iterations of each solver in each pass.
-    #[setting(min = 1, max = 1000)]
-    #[setting(file)]
+    #[setting(min = 1, max = 1000, file)]
     pub max_iterations: u32,
     /// Whether shortcuts to the same optimum are tried first: without constraints, with the
     /// terminal constraint only, then on windows of the horizon.

@@ -21,7 +21,7 @@ mod watch;
 pub use device::Navigation;
 pub use filter::{Covariance, Error, STATES};
 pub use line::{Contradiction, Health, Line};
-pub use settings::{Alignment, Drag, Errors, Fix, Guarded, Initial, Settings, Trust, Wind};
+pub use settings::{Alignment, Drag, Errors, Fix, Guarded, Initial, Settings, Wind};
 pub use shown::{Deviations, Protection, Shown};
 pub use strapdown::State;
 
@@ -132,15 +132,14 @@ impl Navigation {
         time: f64,
         deviations: &Deviations,
     ) -> (Health, Contradiction) {
-        let Trust { deviation, after } = self.settings.health;
         let (contradiction, of_filter) = self.contradiction(running, time);
         let health = if time - running.last.time > UNSEEN_AFTER {
             Health::Lost
         } else if contradiction != Contradiction::None {
             if of_filter { Health::Inconsistent } else { Health::Suspect }
-        } else if deviations.angles.max() > deviation {
+        } else if deviations.angles.max() > self.settings.degraded {
             Health::Degraded
-        } else if time - running.fixed > after {
+        } else if time - running.fixed > self.settings.bridging {
             Health::Bridging
         } else {
             Health::Aided

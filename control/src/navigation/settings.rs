@@ -21,14 +21,10 @@ pub struct Settings {
     #[setting(unit = "s", min = 1e-3, max = 1.0, nominal = 0.01)]
     pub period: f64,
     /// Errors of the gyroscope, in rad/s.
-    #[setting(unit = "rad/s", nominal = 1e-5)]
-    #[setting(used_with = "sensor.set = 2")]
-    #[setting(file)]
+    #[setting(unit = "rad/s", nominal = 1e-5, used_with = "sensor.set = 2", file)]
     pub gyroscope: Errors,
     /// Errors of the accelerometer, in m/s².
-    #[setting(unit = "m/s2", nominal = 1e-2)]
-    #[setting(used_with = "sensor.set = 2")]
-    #[setting(file)]
+    #[setting(unit = "m/s2", nominal = 1e-2, used_with = "sensor.set = 2", file)]
     pub accelerometer: Errors,
     /// Initial state.
     pub initial: Initial,
@@ -44,12 +40,14 @@ pub struct Settings {
     #[setting(file)]
     pub drag: Drag,
     /// Time in which the shown state follows a correction; 0 for at once.
-    #[setting(name = "blend.time", unit = "s", min = 0.0, max = 1e3, nominal = 3.0)]
-    #[setting(file)]
+    #[setting(name = "blend.time", unit = "s", min = 0.0, max = 1e3, nominal = 3.0, file)]
     pub blend: f64,
-    /// When the navigation counts as healthy.
-    #[setting(file)]
-    pub health: Trust,
+    /// Standard deviation of an attitude angle from which the navigation counts as degraded.
+    #[setting(name = "health.deviation", unit = "rad", above = 0.0, nominal = 0.01, file)]
+    pub degraded: f64,
+    /// Time without a fix from which the navigation counts as bridging.
+    #[setting(name = "health.after", unit = "s", above = 0.0, nominal = 5.0, file)]
+    pub bridging: f64,
     /// Largest steps of the biases, beyond their instability.
     #[setting(name = "protection")]
     pub guarded: Guarded,
@@ -84,16 +82,13 @@ pub struct Initial {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Alignment {
     /// Standard deviation of the initial attitude, about each axis.
-    #[setting(unit = "rad", above = 0.0, max = 1.0, nominal = 1e-3)]
-    #[setting(file)]
+    #[setting(unit = "rad", above = 0.0, max = 1.0, nominal = 1e-3, file)]
     pub attitude: f64,
     /// Standard deviation of the initial position along each axis.
-    #[setting(unit = "m", above = 0.0, nominal = 100.0)]
-    #[setting(file)]
+    #[setting(unit = "m", above = 0.0, nominal = 100.0, file)]
     pub position: f64,
     /// Standard deviation of the initial velocity along each axis.
-    #[setting(unit = "m/s", above = 0.0, nominal = 1.0)]
-    #[setting(file)]
+    #[setting(unit = "m/s", above = 0.0, nominal = 1.0, file)]
     pub velocity: f64,
     /// Seed of the errors of the initial state, which have these deviations; 0 for none.
     #[setting(min = 0)]
@@ -125,8 +120,7 @@ pub struct Wind {
     #[setting(unit = "m/s", min = 0.0, max = 300.0, nominal = 30.0)]
     pub deviation: f64,
     /// Change of the altitude over which the wind becomes another one.
-    #[setting(unit = "m", above = 0.0, nominal = 1e4)]
-    #[setting(used_with = "wind.deviation > 0")]
+    #[setting(unit = "m", above = 0.0, nominal = 1e4, used_with = "wind.deviation > 0")]
     pub correlation: f64,
     /// Relative standard deviation of the ratio of side force to lift and drag.
     #[setting(name = "model", min = 0.0, max = 1.0, nominal = 0.1)]
@@ -142,20 +136,8 @@ pub struct Drag {
     #[setting(name = "model", min = 0.0, max = 1.0, nominal = 0.1)]
     pub model: f64,
     /// Change of the altitude over which the error of this product becomes another one.
-    #[setting(unit = "m", above = 0.0, nominal = 1e4)]
-    #[setting(used_with = "drag.model > 0")]
+    #[setting(unit = "m", above = 0.0, nominal = 1e4, used_with = "drag.model > 0")]
     pub correlation: f64,
-}
-
-/// When the navigation counts as healthy.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
-pub struct Trust {
-    /// Standard deviation of an attitude angle from which the navigation counts as degraded.
-    #[setting(unit = "rad", above = 0.0, nominal = 0.01)]
-    pub deviation: f64,
-    /// Time without a fix from which the navigation counts as bridging.
-    #[setting(unit = "s", above = 0.0, nominal = 5.0)]
-    pub after: f64,
 }
 
 /// Largest steps of the biases of the inertial sensors that are to be covered: `deviation.*` and
@@ -202,7 +184,8 @@ impl Default for Settings {
             wind: Wind { deviation: 40.0, correlation: 1e4, model: 0.1 },
             drag: Drag { model: 0.15, correlation: 2e4 },
             blend: 3.0,
-            health: Trust { deviation: 1_f64.to_radians(), after: 5.0 },
+            degraded: 1_f64.to_radians(),
+            bridging: 5.0,
             guarded: Guarded::default(),
         }
     }

@@ -341,14 +341,13 @@ pub(crate) fn fly(case: &Case, mut see: impl FnMut(&Seen)) {
         }
         let entering = plant.entering(time).unwrap();
         let passage = entering.passage;
-        input.prescribed = match &commanded {
-            Some(commanded) => commanded[tick as usize],
-            None => {
-                let (motion, Passage { lift, drag, .. }) = (plant.motion, passage);
-                let known = guidance::Navigation { motion, lift, drag };
-                let reference = guidance.update(&mut guided, tick, &known).reference;
-                Prescribed { angles: reference.angles, rates: reference.rates }
-            }
+        input.prescribed = if let Some(commanded) = &commanded {
+            commanded[tick as usize]
+        } else {
+            let (motion, Passage { lift, drag, .. }) = (plant.motion, passage);
+            let known = guidance::Navigation { motion, lift, drag };
+            let reference = guidance.update(&mut guided, tick, &known).reference;
+            Prescribed { angles: reference.angles, rates: reference.rates }
         };
         commands.push(input.prescribed);
         let sample = plant.measured(Some(&entering), time, &input);

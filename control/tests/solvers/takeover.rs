@@ -16,10 +16,6 @@ struct Spoilt {
 }
 
 impl Bounded<2> for Spoilt {
-    fn constrains_states(&self) -> bool {
-        true
-    }
-
     fn norm_constraints(
         &self,
         k: usize,

@@ -127,10 +127,6 @@ impl Robust {
 }
 
 impl Bounded<2> for Robust {
-    fn constrains_states(&self) -> bool {
-        true
-    }
-
     fn norm_constraints(
         &self,
         k: usize,
