@@ -209,6 +209,20 @@ fn a_step_of_the_bias_is_covered_if_it_is_guarded_against() {
     }
 }
 
+/// After ten seconds in which the gyroscope is blind, the star tracker shows the attitude at once.
+#[test]
+fn stars_show_the_attitude_after_a_blind_time() {
+    let mut case = faulty(2, FaultKind::Frozen, 1.0, [100.0, 110.0], 26);
+    case.stars = true;
+    let mut worst = 0.0_f64;
+    fly(&case, |seen| {
+        if (125.0..200.0).contains(&seen.time) {
+            worst = seen.errors[..3].iter().fold(worst, |a, b| b.abs().max(a));
+        }
+    });
+    assert!(worst.to_degrees() < 0.02, "{} deg", worst.to_degrees());
+}
+
 /// Without a fault nothing is said, and each kind of fault is said by its device.
 #[test]
 fn what_contradicts_is_named() {

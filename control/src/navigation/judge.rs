@@ -23,6 +23,8 @@ use vehicle::math::hypot;
 /// Greatest offset of the receiver's clock that is estimated, and greatest time by which a state is
 /// extrapolated to that of a measurement, s.
 const CLOCK_RANGE: f64 = 0.25;
+/// Standard deviation of the attitude that only a blind gyroscope leads to, rad.
+const BLIND_TILT: f64 = 0.02;
 /// Factor by which standard deviations grow that have turned out too small.
 const GROWTH: f64 = 4.0;
 /// Standard deviations of the estimates of drag, wind, biases from which they are implausible.
@@ -101,12 +103,16 @@ impl Navigation {
         let turned = |(time, before): (f64, Vector3<f64>)| {
             (fix.time - time, (error - before).norm() - 2.0 * DEPARTURE[0] * noise)
         };
-        // What the gyroscope makes of the difference of two fixes is small within seconds.
-        let goes_on = before
-            .map(turned)
-            .is_none_or(|(elapsed, beyond)| elapsed > FORGOTTEN || elapsed > 0.0 && beyond <= 0.0);
+        // What the gyroscope makes of the difference of two fixes is small within seconds, unless it was
+        // blind.
+        let tilt = running.covariance.diagonal().fixed_rows::<3>(ATTITUDE).max().sqrt();
+        let goes_on = before.map(turned).is_none_or(|(elapsed, beyond)| {
+            elapsed > FORGOTTEN || elapsed > 0.0 && beyond <= 0.0 || tilt > BLIND_TILT
+        });
         // The gyroscope does not jump: a star tracker that does is wrong until it has jumped back.
-        if !goes_on {
+        if tilt > BLIND_TILT {
+            running.steady = None;
+        } else if !goes_on {
             let drift = self.errors[0].instability;
             running.steady = running.steady.or(before).filter(|steady| {
                 let (elapsed, beyond) = turned(*steady);
