@@ -210,6 +210,13 @@ fn a_step_of_the_bias_is_covered_if_it_is_guarded_against() {
         let (with, [_, unsaid]) = judged(&case);
         assert!(with[0] < 0.02 && with[0] < 0.2 * without[0], "{seed}: {without:?}, {with:?}");
         assert!(with[1] == 0.0 && unsaid == 0, "{seed}: {with:?}, {unsaid}");
+        // What orchestrator/experiments/campaigns/entry-faults.toml tells CRMPC.
+        let declared = 2_f64.to_radians();
+        fly(&case, |seen| {
+            let largest = seen.errors[2..].iter().fold(0.0_f64, |a, b| b.abs().max(a));
+            let is_in_force = seen.protection.attitude <= declared;
+            assert!(!is_in_force || largest <= declared, "{seed}: {seen:?}");
+        });
     }
 }
 

@@ -23,7 +23,8 @@ use vehicle::math::hypot;
 /// Greatest offset of the receiver's clock that is estimated, and greatest time by which a state is
 /// extrapolated to that of a measurement, s.
 const CLOCK_RANGE: f64 = 0.25;
-/// Standard deviation of the attitude that only a blind gyroscope leads to, rad.
+/// Standard deviation of the attitude from which another one is no jump of the star tracker, rad: only
+/// a blind gyroscope leads to it while there are stars.
 const BLIND_TILT: f64 = 0.02;
 /// Factor by which standard deviations grow that have turned out too small.
 const GROWTH: f64 = 4.0;
@@ -47,9 +48,9 @@ impl Navigation {
         let planet = &self.settings.planet;
         let noise = &self.settings.fix;
         let silent = running.last.time - running.watches[0].at;
-        // The initial position tells an offset of the clock from a wrong one.
         if silent > FORGOTTEN && silent.is_finite() {
-            // Nobody knows whether a clock that has been wrong still is.
+            // After a gap nobody knows whether the clock is as it was; at the first fix the initial
+            // position shows it.
             let deviation = running.clock.abs().max(self.settings.guarded.clock / 2.0);
             running.covariance.fill_row(CLOCK, 0.0);
             running.covariance.fill_column(CLOCK, 0.0);
@@ -105,7 +106,7 @@ impl Navigation {
         };
         // What the gyroscope makes of the difference of two fixes is small within seconds, unless it was
         // blind.
-        let tilt = running.covariance.diagonal().fixed_rows::<3>(ATTITUDE).max().sqrt();
+        let tilt = running.tilt();
         let goes_on = before.map(turned).is_none_or(|(elapsed, beyond)| {
             elapsed > FORGOTTEN || elapsed > 0.0 && beyond <= 0.0 || tilt > BLIND_TILT
         });

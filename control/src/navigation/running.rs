@@ -130,6 +130,11 @@ impl Running {
         self.still.map(|still| still >= STILL)
     }
 
+    /// Returns the largest standard deviation of the attitude about an axis, rad.
+    pub(super) fn tilt(&self) -> f64 {
+        self.covariance.diagonal().fixed_rows::<3>(ATTITUDE).max().sqrt()
+    }
+
     /// Returns the covariance of what is shown a time `age` (s) after the last sample: of the
     /// filter's state, what the blended one lacks of it, the disagreements that are not resolved, and
     /// what moves unseen.
@@ -280,7 +285,7 @@ impl Navigation {
         if by_star {
             self.take_star(running, &star);
         }
-        let tilt = running.covariance.diagonal().fixed_rows::<3>(ATTITUDE).max().sqrt();
+        let tilt = running.tilt();
         if tilt > LINEAR && running.is_blind()[0] {
             running.surprise = Some((Contradiction::Gyroscope, time));
         }
