@@ -1,4 +1,5 @@
-"""Settings in which some variables act and no experiment has them, with an experiment's inputs."""
+"""Settings in which some variables act and no experiment has them, with an experiment's inputs. An input
+may be given as a list, one value a communication point."""
 
 from conftest import ROOT, TARGET
 
@@ -12,6 +13,9 @@ def skew() -> str:
 
 
 ROWS = range(1, 9)
+# Air is measured only as long as every sample is received.
+AIR = {"initial.altitude": 6e4, "initial.speed": 6500.0, "measured.accelerometer.x": -3.0, "measured.accelerometer.z": -4.0}
+AIR |= {"measured.sample": [k + 1 for k in range(61)], "measured.time": [0.04 * k for k in range(61)]}
 FAILING = ("tvsmc-2015/allocated", {"effector.fault.kind": "slow", "effector.fault.number": 1})
 TURNING = ("entry/from-120km", {"reference.externalRate.beta": 0.01})
 SCENES = {
@@ -26,6 +30,7 @@ SCENES = {
     "EntryNavigation": {
         "a star tracker": ("entry/navigated", {"star.fix": 1, "star.attitude.w": 0.7, "star.attitude.x": 0.7}),
         "a start without a fix": ("entry/navigated", {"gnss.fix": 0}),
+        "a start in the air": ("entry/navigated", AIR | {"gnss.fix": 0}),
     },
     "ControlAllocator": {"a surface that becomes slow": FAILING},
     "ReentryPlant": {

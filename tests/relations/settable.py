@@ -329,8 +329,15 @@ def places_of(fmu: Fmu, fmus: list[Fmu], found: dict[str, list[Place]]) -> list[
     exchanged = [place for place in others if place.name not in {place.name for place in own}]
     scenes = SCENES.get(fmu.name, {}).items()
     base = {place.name: place for place in own + exchanged}
-    made = [replace(base[experiment], name=title, settings=base[experiment].settings | settings) for title, (experiment, settings) in scenes]
-    return own + exchanged + made
+    return own + exchanged + [scene(fmu, base[experiment], title, settings) for title, (experiment, settings) in scenes]
+
+
+def scene(fmu: Fmu, base: Place, title: str, given: dict) -> Place:
+    """The place of an experiment with other settings and signals. Communication points are where samples are measured, if these are given."""
+    signals = {name: value for name, value in given.items() if isinstance(value, list) and name in fmu.variables}
+    settings = {name: value for name, value in (base.settings | given).items() if name not in signals}
+    times = signals.get("measured.time", base.times)[: len(base.times)]
+    return replace(base, name=title, settings=settings, inputs=base.inputs | signals, times=times)
 
 
 # The page
