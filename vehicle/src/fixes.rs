@@ -145,10 +145,11 @@ pub struct Fixes {
 }
 
 impl StarFix {
-    /// Returns the rotation, unless the quaternion is zero or not finite.
+    /// Returns the rotation, unless the norm of the quaternion is far from 1.
     pub fn rotation(&self) -> Option<UnitQuaternion<f64>> {
         let [w, x, y, z] = self.attitude;
-        UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 0.1)
+        let given = Quaternion::new(w, x, y, z);
+        (given.norm() - 1.0).abs().le(&0.1).then(|| UnitQuaternion::new_normalize(given))
     }
 }
 

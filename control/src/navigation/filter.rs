@@ -52,6 +52,8 @@ pub(super) struct Way {
     pub(super) climbed: f64,
     /// Part of its duration in which gyroscope and accelerometer showed nothing, s.
     pub(super) blind: [f64; 2],
+    /// Time between two samples of it times that for which some are missing, in sum, s².
+    pub(super) sparse: f64,
 }
 
 /// What the filter expects of the sensors and of the air.
@@ -91,7 +93,7 @@ pub(super) fn propagated(
     way: &Way,
     expected: &Expected<'_>,
 ) -> Covariance {
-    let Way { time, pushed, attitude, gradient, climbed, blind } = way;
+    let Way { time, pushed, attitude, gradient, climbed, blind, sparse } = way;
     let Expected { errors, period, wind, drag } = expected;
     let cross = pushed.cross_matrix();
     let kept_biases = errors.map(|errors| kept(&errors, *time));
@@ -121,8 +123,11 @@ pub(super) fn propagated(
         let noise = errors[i].noise * period.sqrt();
         noise * noise + LEAST_NOISE[i] * LEAST_NOISE[i]
     };
-    // What is not seen stays what it is for about a second.
-    let added = |i: usize| density(i) * time + UNSEEN[i] * UNSEEN[i] * blind[i];
+    // What is not seen stays what it is for about a second. A sample counts until the next one.
+    let added = |i: usize| {
+        let noise = errors[i].noise;
+        density(i) * time + UNSEEN[i] * UNSEEN[i] * blind[i] + noise * noise * sparse
+    };
     let (by_rate, by_force) = (added(0), added(1));
     let wandered = |i: usize| {
         let deviation = errors[i].instability;

@@ -26,6 +26,9 @@ const CLOCK_RANGE: f64 = 0.25;
 /// Standard deviation of the attitude from which another one is no jump of the star tracker, rad: only
 /// a blind gyroscope leads to it while there are stars.
 const BLIND_TILT: f64 = 0.02;
+/// Standard deviation of the attitude from which a contradiction widens it no more, rad: a receiver
+/// that is wrong for minutes would make it unknown.
+const WIDEST: f64 = 0.004;
 /// Factor by which standard deviations grow that have turned out too small.
 const GROWTH: f64 = 4.0;
 /// Standard deviations of the estimates of drag, wind, biases from which they are implausible.
@@ -35,16 +38,17 @@ impl Navigation {
     /// Returns the state at a time (s) that need not be that of the last sample.
     fn state_at(&self, running: &Running, time: f64) -> Option<State> {
         let now = running.last.time;
-        if let Some(state) = running.history.at(time, (now, &running.state)) {
-            return Some(state);
+        let kept = running.history.at(time, (now, &running.state));
+        if kept.is_some() || (time - now).abs() > CLOCK_RANGE {
+            return kept.filter(|_| time - now <= CLOCK_RANGE);
         }
         let felt = running.felt(&running.last);
-        let extrapolated = || running.state.after(&self.settings.planet, time - now, &felt, &felt);
-        ((time - now).abs() <= CLOCK_RANGE).then(|| extrapolated().0)
+        Some(running.state.after(&self.settings.planet, time - now, &felt, &felt).0)
     }
 
-    /// Takes a fix of satellite navigation at its own time.
-    pub(super) fn take_gnss(&self, running: &mut Running, fix: &GnssFix) {
+    /// Takes a fix of satellite navigation at its own time, whose position may be that of the fix
+    /// before.
+    pub(super) fn take_gnss(&self, running: &mut Running, fix: &GnssFix, is_repeated: bool) {
         let planet = &self.settings.planet;
         let noise = &self.settings.fix;
         let silent = running.last.time - running.watches[0].at;
@@ -62,7 +66,7 @@ impl Navigation {
             (time, position, to_inertial * fix.velocity + rotation(planet).cross(&position))
         };
         // By its own clock, whatever that is found to be.
-        let agrees = running.heard.agrees(inertial(fix.time), noise.position);
+        let agrees = running.heard.agrees(inertial(fix.time), noise.position, is_repeated);
         let (time, position, velocity) = inertial(fix.time + running.clock);
         let (radius, speed) = (position.norm() / planet.radius, velocity.norm());
         let circular = (planet.gravitation / planet.radius).sqrt();
@@ -92,17 +96,20 @@ impl Navigation {
         self.judge(running, &measured, Source::Gnss, agrees);
     }
 
-    /// Takes a fix of the star tracker at its own time.
-    pub(super) fn take_star(&self, running: &mut Running, fix: &StarFix) {
+    /// Takes a fix of the star tracker at its own time, whose attitude may be that of the fix before.
+    pub(super) fn take_star(&self, running: &mut Running, fix: &StarFix, is_repeated: bool) {
         let then = self.state_at(running, fix.time);
         let (Some(then), Some(seen)) = (then, fix.rotation()) else {
             return Self::refuse(running, Source::Star);
         };
         let error = (seen.inverse() * then.attitude.inverse()).scaled_axis();
         let noise = self.settings.fix.attitude;
-        let before = running.pointed.replace((fix.time, error));
+        let before = running.pointed;
+        // From the first of equal fixes on, to which noise adds nothing.
+        let (repeats, jump) = if is_repeated { (before, 1.0) } else { (None, 2.0 * DEPARTURE[0]) };
+        running.pointed = repeats.or(Some((fix.time, error)));
         let turned = |(time, before): (f64, Vector3<f64>)| {
-            (fix.time - time, (error - before).norm() - 2.0 * DEPARTURE[0] * noise)
+            (fix.time - time, (error - before).norm() - jump * noise)
         };
         // What the gyroscope makes of the difference of two fixes is small within seconds, unless it was
         // blind.
@@ -148,6 +155,11 @@ impl Navigation {
     /// Refuses a measurement of a device that contradicts itself.
     fn refuse(running: &mut Running, source: Source) {
         running.rejected += 1;
+        let now = running.last.time;
+        if source == Source::Gnss && now - running.restarted < RECOVERY {
+            // The filter began anew by what has contradicted itself.
+            running.surprise = Some((Contradiction::Gnss, now));
+        }
         let watch = &mut running.watches[source as usize];
         (watch.agreed, watch.refused) = (0, 0);
     }
@@ -180,6 +192,10 @@ impl Navigation {
         let gate = self.gate(size);
         if squares <= gate {
             watch.refused = 0;
+            if source == Source::Gnss && watch.is_surprised()[1] {
+                // It leads the filter astray in small steps.
+                running.surprise = Some((Contradiction::Gnss, running.last.time));
+            }
             Self::apply(running, &error, &covariance, source);
             return;
         }
@@ -211,7 +227,7 @@ impl Navigation {
     }
 
     /// Begins anew with the states from `from` on that are measured. The others keep their values,
-    /// and after a second contradiction within a minute their deviations grow.
+    /// and after a second contradiction within a minute their deviations grow, up to [`WIDEST`].
     fn restart(running: &mut Running, measured: &[Measured], from: usize, source: Source) {
         let mut error = Error::zeros();
         let mut covariance = running.covariance;
@@ -226,7 +242,7 @@ impl Navigation {
             covariance[(from + i, from + i)] = variance + group.norm_squared() / 3.0;
         }
         let now = running.last.time;
-        if now - running.restarted < RECOVERY {
+        if now - running.restarted < RECOVERY && running.tilt() < WIDEST {
             widen(&mut covariance, if from == ATTITUDE { GYROSCOPE } else { ATTITUDE }..WIND);
         }
         if running.surprise.is_none() {

@@ -28,6 +28,7 @@ pub use strapdown::State;
 use running::{Running, UNSEEN_AFTER};
 use serde::{Deserialize, Serialize};
 use strapdown::Felt;
+use vehicle::fixes::Fixes;
 use vehicle::frames::Place;
 use vehicle::math::exp;
 
@@ -37,6 +38,8 @@ const LONGEST: f64 = 60.0;
 /// State that is carried from tick to tick.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Memory {
+    /// Time of the first tick, at which the state is the initial one, s.
+    start: Option<f64>,
     /// State once a sample has arrived, apart from the rest because a caller's stack may be small.
     running: Box<Option<Running>>,
     /// What is shown.
@@ -56,7 +59,8 @@ impl Clone for Memory {
 
     /// Copies a memory without allocation, as at every tick.
     fn clone_from(&mut self, source: &Self) {
-        let Self { running, shown, health, contradiction, missed } = self;
+        let Self { start, running, shown, health, contradiction, missed } = self;
+        *start = source.start;
         running.clone_from(&source.running);
         *shown = source.shown;
         (*health, *contradiction, *missed) = (source.health, source.contradiction, source.missed);
@@ -81,23 +85,30 @@ impl Navigation {
     pub fn update(&self, memory: &mut Memory, time: f64, line: &Line) {
         let mut line = *line;
         line.time = if line.sample > 0 { line.time.min(time) } else { time };
+        let start = *memory.start.get_or_insert(time);
         match &mut *memory.running {
             Some(running) => {
-                if let Some(missed) = running.succeeds(&mut line, time) {
+                if let Some(missed) = running.succeeds(&mut line, time, self.settings.period) {
                     memory.missed = memory.missed.saturating_add(missed);
                     self.take(running, &line);
                 }
             }
-            begun if line.is_plausible() => self.begin_in(begun, &line),
+            begun if line.is_plausible() => self.begin_in(begun, start, &line),
             _ => return,
         }
         self.present(memory, time);
     }
 
-    /// Begins with a line. A frame of its own keeps the stack of an update small.
+    /// Begins at the start with the first line, which may come later. A frame of its own keeps the
+    /// stack of an update small.
     #[inline(never)]
-    fn begin_in(&self, running: &mut Option<Running>, line: &Line) {
-        *running = Some(self.begin(line));
+    fn begin_in(&self, begun: &mut Option<Running>, start: f64, line: &Line) {
+        let is_late = line.time > start;
+        let fixes = if is_late { Fixes::default() } else { line.fixes };
+        let running = begun.insert(self.begin(&Line { time: start, fixes, ..*line }));
+        if is_late {
+            self.take(running, line);
+        }
     }
 
     /// Shows the state at `time` (s), in a frame of its own as well.

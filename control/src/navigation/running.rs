@@ -59,6 +59,8 @@ pub(super) struct Running {
     way: (f64, Vector3<f64>, f64),
     /// Time of it in which gyroscope and accelerometer showed nothing, s.
     blind: [f64; 2],
+    /// Time between two samples of it times that for which some are missing, in sum, s².
+    sparse: f64,
     /// Samples in a row that equal the one before, of both.
     still: [u32; 2],
     /// Past states.
@@ -105,15 +107,22 @@ impl Running {
     }
 
     /// Returns the number of samples that were missed before that of `line`, if it is a new one, and
-    /// corrects its time, which is not after `now` (s). A number that does not grow is that of a
-    /// unit that began anew; if its clock did, too, its samples come now.
-    pub(super) fn succeeds(&mut self, line: &mut Line, now: f64) -> Option<u32> {
+    /// corrects its time, which is not after `now` (s), by the `period` (s) of the samples. A number
+    /// that does not grow is that of a unit that began anew; if its clock did, too, its samples come
+    /// now.
+    pub(super) fn succeeds(&mut self, line: &mut Line, now: f64, period: f64) -> Option<u32> {
         let last = &self.last;
         if !line.is_plausible() || line.sample > 0 && line.sample == last.sample {
             return None;
         }
         let time = (line.time + self.ahead).min(now);
+        let counted = line.sample.saturating_sub(last.sample);
         if time > last.time {
+            line.time = time;
+        } else if last.sample > 0 && counted > 0 {
+            // The clock has been put back, and the number says how long ago the last sample was.
+            let time = (last.time + f64::from(counted) * period).min(now);
+            self.ahead = time - line.time;
             line.time = time;
         } else if now - last.time > UNSEEN_AFTER {
             self.ahead = now - line.time;
@@ -121,8 +130,7 @@ impl Running {
         } else {
             return None;
         }
-        let missed = line.sample.saturating_sub(last.sample).saturating_sub(1);
-        Some(u32::try_from(missed).unwrap_or(0))
+        Some(u32::try_from(counted.saturating_sub(1)).unwrap_or(0))
     }
 
     /// Returns whether gyroscope and accelerometer show nothing: their samples repeat themselves.
@@ -224,6 +232,7 @@ impl Navigation {
             clock: 0.0,
             way: (0.0, Vector3::zeros(), state.position.norm()),
             blind: [0.0; 2],
+            sparse: 0.0,
             still: [0; 2],
             history: History::default(),
             offset: [Error::zeros(); 2],
@@ -257,6 +266,10 @@ impl Navigation {
                 running.blind[i] += elapsed;
             }
         }
+        let missing = elapsed - self.settings.period;
+        if missing > 0.5 * self.settings.period && elapsed <= UNSEEN_AFTER {
+            running.sparse += elapsed * missing;
+        }
         let (from, to) = (running.felt(&running.last), running.felt(line));
         let (state, pushed) = running.state.after(&self.settings.planet, elapsed, &from, &to);
         let before = running.last.fixes;
@@ -280,10 +293,10 @@ impl Navigation {
         }
         self.propagate(running);
         if by_gnss {
-            self.take_gnss(running, &gnss);
+            self.take_gnss(running, &gnss, gnss.position == before.gnss.position);
         }
         if by_star {
-            self.take_star(running, &star);
+            self.take_star(running, &star, star.attitude == before.star.attitude);
         }
         let tilt = running.tilt();
         if tilt > LINEAR && running.is_blind()[0] {
@@ -314,6 +327,7 @@ impl Navigation {
             gradient: gravity_gradient(self.settings.planet.gravitation, &running.state.position),
             climbed: radius - from,
             blind: std::mem::take(&mut running.blind),
+            sparse: std::mem::take(&mut running.sparse),
         };
         let Settings { period, wind, drag, .. } = &self.settings;
         let expected = Expected { errors: &self.errors, period: *period, wind, drag };

@@ -114,11 +114,16 @@ pub struct Shown {
 impl Shown {
     /// Returns whether all of it are finite numbers.
     pub(super) fn is_finite(&self) -> bool {
-        let Self { motion, motion_rate, angles, rates, biases, deviations, .. } = self;
+        let Self { motion, motion_rate, angles, rates, flow, wind, .. } = self;
+        let Self { lift, drag, drag_ratio, deviations, innovations, biases, .. } = self;
+        let Deviations { position, velocity, altitude, .. } = deviations;
         let vectors = [angles, rates, &biases[0], &biases[1], &deviations.angles];
         let numbers = [motion, motion_rate].into_iter().flatten();
-        let mut numbers = numbers.chain(vectors.into_iter().flatten()).chain(&deviations.flow);
-        numbers.all(|value| value.is_finite())
+        let numbers = numbers.chain(vectors.into_iter().flatten()).chain(innovations);
+        let numbers =
+            numbers.chain([flow, wind, &deviations.flow, &deviations.wind].into_iter().flatten());
+        let single = [lift, drag, drag_ratio, position, velocity, altitude, &deviations.drag];
+        numbers.chain(single).all(|value| value.is_finite())
     }
 }
 

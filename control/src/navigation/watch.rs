@@ -21,6 +21,8 @@ const LARGEST: f64 = 25.0;
 /// depart from its velocities; time over which the departure is forgotten, s.
 pub(super) const DEPARTURE: [f64; 2] = [6.0, 1e-3];
 pub(super) const FORGOTTEN: f64 = 30.0;
+/// Largest departure that is kept, as a multiple of the largest that agrees.
+const LASTING: f64 = 4.0;
 
 /// Measurements of one source so far.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -95,22 +97,34 @@ pub(super) struct Heard {
 }
 
 impl Heard {
-    /// Takes a fix with this noise (m), and returns whether it agrees with those before.
-    pub(super) fn agrees(&mut self, fix: (f64, Vector3<f64>, Vector3<f64>), noise: f64) -> bool {
+    /// Takes a fix with this noise (m), whose position may be that of the fix before to the last bit.
+    /// Returns whether it agrees with those before.
+    pub(super) fn agrees(
+        &mut self,
+        fix: (f64, Vector3<f64>, Vector3<f64>),
+        noise: f64,
+        is_repeated: bool,
+    ) -> bool {
         let (time, position, velocity) = fix;
         let Some((before, from, slower)) = self.last.replace(fix) else { return true };
         let elapsed = time - before;
-        if elapsed > FORGOTTEN {
+        let way = (velocity + slower) * (elapsed / 2.0);
+        let is_frozen = is_repeated && way.norm() > noise;
+        if elapsed > FORGOTTEN && !is_frozen {
             self.departure = Vector3::zeros();
             return true;
         }
-        let way = (velocity + slower) * (elapsed / 2.0);
-        self.departure = self.departure * exp(-elapsed / FORGOTTEN) + position - from - way;
-        let agrees = elapsed > 0.0
-            && self.departure.norm() <= DEPARTURE[0] * noise + DEPARTURE[1] * way.norm();
-        if !agrees {
+        let most = DEPARTURE[0] * noise + DEPARTURE[1] * way.norm();
+        let departed = position - from - way;
+        let has_jumped = is_frozen || !(elapsed > 0.0 && departed.norm() <= most);
+        if has_jumped {
+            // It may agree with itself at once where it is now; velocities that do not fit go on.
             self.departure = Vector3::zeros();
+            return false;
         }
+        self.departure = self.departure * exp(-elapsed / FORGOTTEN) + departed;
+        let agrees = self.departure.norm() <= most;
+        self.departure = self.departure.cap_magnitude(LASTING * most);
         agrees
     }
 }

@@ -34,6 +34,10 @@ pub(crate) struct Case {
     /// Sensor set, see [`SensorData::inertial`].
     pub(crate) set: i32,
     pub(crate) stars: bool,
+    /// Period of the star tracker, s.
+    pub(crate) star_period: f64,
+    /// Share of the samples that are lost.
+    pub(crate) dropped: f64,
     pub(crate) seed: u64,
     /// Wind to the north and to the east at 20, 60 and 100 km, m/s.
     pub(crate) wind: [[f64; 2]; 3],
@@ -56,6 +60,8 @@ impl Case {
         Self {
             set,
             stars,
+            star_period: 1.0,
+            dropped: 0.0,
             seed,
             wind: [[0.0; 2]; 3],
             density: [1.0; ROWS],
@@ -282,7 +288,7 @@ fn vehicle(case: &Case) -> (Config, vehicle::plant::Config) {
         end: End { altitude: 20e3, speed: 762.0 },
     };
     let mut devices = Devices::default();
-    devices.star.period = if case.stars { 1.0 } else { 0.0 };
+    devices.star.period = if case.stars { case.star_period } else { 0.0 };
     [devices.gnss.fault, devices.star.fault, devices.inertial] = case.faults;
     let data = SensorData::embedded();
     let triads = if case.set == 1 { PerSensor::default() } else { data.inertial(case.set, PERIOD) };
@@ -304,8 +310,8 @@ fn vehicle(case: &Case) -> (Config, vehicle::plant::Config) {
             line: Timing {
                 period: PERIOD,
                 delay: 0.0,
-                drop_probability: 0.0,
-                drop_window: Window::default(),
+                drop_probability: case.dropped,
+                drop_window: Window { start: 0.0, end: 1e15 },
             },
             devices,
             seed: case.seed,
@@ -355,11 +361,13 @@ pub(crate) fn fly(case: &Case, mut see: impl FnMut(&Seen)) {
         let line =
             Line { sample: sample.number, time: sample.time, rate, force, fixes: sample.fixes };
         navigation.update(&mut memory, time, &line);
-        if tick.is_multiple_of(case.every) {
-            let altitude = plant.motion[0];
-            let wind = entry.air.at(time, altitude).wind;
-            let truth = Place::of(&entry.planet, &plant.motion, &plant.angles(), time);
-            let (error, covariance) = navigation.error(&memory, &truth, [wind.x, wind.y]).unwrap();
+        let altitude = plant.motion[0];
+        let wind = entry.air.at(time, altitude).wind;
+        let truth = Place::of(&entry.planet, &plant.motion, &plant.angles(), time);
+        // There is none before the first sample.
+        if tick.is_multiple_of(case.every)
+            && let Some((error, covariance)) = navigation.error(&memory, &truth, [wind.x, wind.y])
+        {
             let shown = &memory.shown;
             let off = shown.angles - plant.angles();
             let turn = |angle: f64| vehicle::axes::nearest(angle, 0.0);
@@ -430,9 +438,15 @@ pub(crate) fn exceeded(case: &Case) -> [f64; 2] {
 /// deviations, and of those that `health` does not say within ten seconds. Sees the flight once a
 /// second.
 pub(crate) fn judged(case: &Case) -> ([f64; 2], [u32; 2]) {
+    judged_with(case, |_| {})
+}
+
+/// Returns the same, and calls `see` as often as the case says.
+pub(crate) fn judged_with(case: &Case, mut see: impl FnMut(&Seen)) -> ([f64; 2], [u32; 2]) {
     let (mut count, mut beyond) = (0.0, [0.0; 2]);
     let (mut times, mut lasted, mut unsaid) = ([0; 2], 0, 0);
     fly(case, |seen| {
+        see(seen);
         let is_large = seen.deviations() > 5.0;
         times[0] += u32::from(is_large && lasted == 0);
         lasted = if is_large { lasted + 1 } else { 0 };
