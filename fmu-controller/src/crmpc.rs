@@ -135,7 +135,7 @@ impl Law for CrmpcLaw {
         if now.ended == 1 && earlier.ended == 0 {
             return Some(match now.contradiction {
                 Contradiction::Step => {
-                    "the guarantee is no longer in force: a tick used inputs that had been set before it; step with period.feedback or a whole fraction of it"
+                    "the guarantee is no longer in force: a tick used inputs that had been set before it"
                 }
                 Contradiction::Delay => {
                     "the guarantee is no longer in force: the loop delay differs from delay + measurement.age by more than half a period"

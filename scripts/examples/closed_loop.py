@@ -25,6 +25,7 @@ class Instance:
     def __init__(self, path, parameters=None):
         description = read_model_description(path)
         self.folder = extract(path)
+        self.proposed_step = float(description.defaultExperiment.stepSize)
         self.variables = {variable.name: variable for variable in description.modelVariables}
         self.fmu = FMU2Slave(
             guid=description.guid,
@@ -52,11 +53,13 @@ class Instance:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-def simulate(controller, stop=50.0, step=0.04, parameters=None, fmus=FMUS):
+def simulate(controller, stop=50.0, parameters=None, fmus=FMUS):
     """Steps the loop and returns rows of time, attitude, rate, moment and reference. The parameters
     are those of the plant."""
     plant = Instance(str(fmus / "ReentryPlant.fmu"), parameters)
     law = Instance(str(fmus / f"{controller}.fmu"))
+    # A controller that works faster than the plant proposes would see old inputs.
+    step = min(plant.proposed_step, law.proposed_step)
     rows = []
     for k in range(round(stop / step)):
         state, reference = plant.get(ATTITUDE + RATE), law.get(REFERENCE)

@@ -5,6 +5,9 @@ use fmi_export::{Context, Description, EventInfo, Failure, Inputs, LastEvent, Mo
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::ops::{Deref, DerefMut};
 
+/// Warning at the first tick whose inputs are not those of its instant.
+const LATE: &str = "a tick within a step used inputs that had been set before it: step with the period of the ticks, or with a whole fraction of it";
+
 /// The ticks of an instance with their memory.
 pub type Ticks<I> = Sampled<
     <I as SampledInstance>::Memory,
@@ -109,6 +112,9 @@ pub struct SampledFmu<I: SampledInstance> {
     instance: Box<I>,
     /// Ticks of the instance; present from initialization on.
     ticks: Option<Box<Ticks<I>>>,
+    /// Whether the log has told that ticks lie within steps.
+    #[serde(skip)]
+    has_told: bool,
     #[serde(skip)]
     device: Option<Box<I::Device>>,
 }
@@ -164,7 +170,7 @@ impl<I: SampledInstance> Model for SampledFmu<I> {
     }
 
     fn new() -> Self {
-        Self { instance: Box::new(I::new()), ticks: None, device: None }
+        Self { instance: Box::new(I::new()), ticks: None, has_told: false, device: None }
     }
 
     fn reset(&mut self) {
@@ -218,12 +224,17 @@ impl<I: SampledInstance> Model for SampledFmu<I> {
             inputs.advance(self, tick.max(from));
             let (instance, device, ticks) = self.parts()?;
             let are_current = ticks.is_due(from) && inputs.are_current();
-            if are_current || inputs.are_extrapolated() {
-                instance.evaluate(device, ticks)?;
-            } else {
+            let is_stale = !are_current && !inputs.are_extrapolated();
+            if is_stale {
                 instance.evaluate_stale(device, ticks)?;
+            } else {
+                instance.evaluate(device, ticks)?;
             }
             ticks.commit();
+            if is_stale && !std::mem::replace(&mut self.has_told, true) {
+                log(LATE);
+            }
+            let (_, _, ticks) = self.parts()?;
             if let Some(text) = ticks.last_change(I::warning) {
                 log(text);
             }
@@ -239,6 +250,7 @@ impl<I: SampledInstance> Model for SampledFmu<I> {
     }
 
     fn restored(&mut self, from: Restoration<'_, Self>) -> Result<(), Failure> {
+        self.has_told = from.before.has_told;
         let Some(ticks) = self.ticks.as_ref().filter(|_| from.initialized) else { return Ok(()) };
         if let Some(problem) = self.instance.problem(&from.before.instance) {
             return misfit(problem);

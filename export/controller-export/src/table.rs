@@ -10,13 +10,12 @@ use vehicle::Scenario;
 
 /// Returns the description of a controller's FMU.
 pub fn description<L: Law>() -> Description<ControllerFmu<L>> {
-    let scenario = Scenario::crmpc2022();
     Description {
         documentation: format!("{}{}", L::DOCUMENTATION, include_str!("wiring.html")),
         version: L::VERSION,
         default_experiment: DefaultExperiment {
-            stop: scenario.duration,
-            step: scenario.disturbance.period,
+            stop: Scenario::crmpc2022().duration,
+            step: L::period(&L::settings()),
             ..DefaultExperiment::default()
         },
         ..Description::new(L::NAME, L::DESCRIPTION, L::outputs(table::<L>()))

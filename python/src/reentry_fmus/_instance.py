@@ -83,6 +83,7 @@ class Instance:
             raise ValueError(f"{path}: a loop needs an FMU for co-simulation by FMI 2.0")
         self.name: str = description.modelName
         self.variables: dict[str, Any] = {v.name: v for v in description.modelVariables}
+        self.proposed_step = float(getattr(description.defaultExperiment, "stepSize", None) or 0.04)
         self.values(parameters, "parameter")
         callbacks = fmi2.fmi2CallbackFunctions(
             fmi2.fmi2CallbackLoggerTYPE(self._log),

@@ -49,7 +49,7 @@ class ClosedLoop:
     Args:
         plant: Name of an FMU of the package, or the path of one with the same variables.
         controller: The same for the controller. With None, `step` takes the moment.
-        step: Length of a communication step, s.
+        step: Length of a communication step, s; by default the shorter of those that the FMUs propose.
         parameters: Parameters by component, such as {"plant.disturbance.seed": 7,
             "controller.constraints": "paper"}: numbers in SI units, enumerations by their items'
             names. Without a controller, "controller.reference.*" chooses the reference, and
@@ -64,16 +64,16 @@ class ClosedLoop:
         self,
         plant: str | os.PathLike[str] = "ReentryPlant",
         controller: str | os.PathLike[str] | None = None,
-        step: float = 0.04,
+        step: float | None = None,
         parameters: Mapping[str, Value] | None = None,
     ) -> None:
-        if not (np.isfinite(step) and step > 0.0):
+        if step is not None and not (np.isfinite(step) and step > 0.0):
             raise ValueError(f"step = {step} s, but a positive time is needed")
         by_component = split(parameters or {}, has_controller=controller is not None)
         # Every controller computes the reference. If the law is in Python, one of them is used for
         # that alone: its inputs are not set, and its moment is not read.
         paths = {"plant": fmu_path(plant), "controller": fmu_path(controller or "LQR")}
-        self._open(paths, by_component, float(step), has_controller=controller is not None)
+        self._open(paths, by_component, step, has_controller=controller is not None)
         try:
             self._initialize()
         except BaseException:
@@ -84,11 +84,10 @@ class ClosedLoop:
         self,
         paths: dict[str, Path],
         parameters: dict[str, dict[str, Value]],
-        step: float,
+        step: float | None,
         has_controller: bool,
     ) -> None:
         self._paths = paths
-        self._step = step
         self._is_open = True
         self._is_asking = False
         self._failure: InstanceError | None = None
@@ -101,6 +100,7 @@ class ClosedLoop:
             self._plant.close()
             raise
         try:
+            self._step = float(step or min(self._plant.proposed_step, self._controller.proposed_step))
             self._wire()
         except BaseException:
             self.close()
