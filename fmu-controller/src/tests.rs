@@ -5,6 +5,7 @@ mod own_vehicle;
 
 use crate::crmpc::CrmpcLaw;
 use crate::dlmpc::DlmpcLaw;
+use crate::lqr::LqrLaw;
 use crate::tvsmc::{self, TvsmcLaw};
 use crate::{BtvsmcDo, Crmpc, Dlmpc, Lqr};
 use controller_export::reference::Choice;
@@ -39,10 +40,11 @@ fn ready<M: Model>(change: impl FnOnce(&mut M)) -> M {
 }
 
 fn step<M: Model>(instance: &mut M, from: f64, to: f64) {
-    // Inputs that jump contradict the assumptions of CRMPC, and no command explains them.
-    let explains =
-        |text: &str| text.contains("the guarantee is") || text.contains("another loop delay");
-    instance.step(from, to, &Held, &mut |text| assert!(explains(text), "{text}")).unwrap();
+    // Inputs that jump contradict the assumptions of CRMPC, and no command explains them. Steps are
+    // longer than a period.
+    let expected = ["the guarantee is", "another loop delay", "a tick within a step"];
+    let is_expected = |text: &str| expected.iter().any(|part| text.contains(part));
+    instance.step(from, to, &Held, &mut |text| assert!(is_expected(text), "{text}")).unwrap();
     instance.calculate(to, LastEvent::InputSet).unwrap();
 }
 
@@ -89,6 +91,37 @@ fn any_communication_steps_give_the_same_moments() {
             delay, &parts,
         );
     }
+}
+
+/// A law that is stepped as its FMU proposes sees every measurement. Longer steps are told, once.
+#[test]
+fn ticks_with_old_inputs_are_told() {
+    fn told<L: Law>() {
+        let period = L::period(&L::settings());
+        assert_eq!(
+            <ControllerFmu<L>>::description().default_experiment.step,
+            period,
+            "{}",
+            L::NAME
+        );
+        for (length, expected) in
+            [(period, 0), (period / 2.0, 0), (1.25 * period, 1), (4.0 * period, 1)]
+        {
+            let mut instance: ControllerFmu<L> = ready(|_| ());
+            let mut count = 0;
+            for k in 0..20 {
+                let [from, to] = [f64::from(k), f64::from(k + 1)].map(|k| k * length);
+                let mut log =
+                    |text: &str| count += i32::from(text.contains("a tick within a step"));
+                instance.step(from, to, &Held, &mut log).unwrap();
+            }
+            assert_eq!(count, expected, "{}: {length} s", L::NAME);
+        }
+    }
+    told::<CrmpcLaw>();
+    told::<DlmpcLaw>();
+    told::<LqrLaw>();
+    told::<TvsmcLaw<tvsmc::SotvsmcDo>>();
 }
 
 #[test]
