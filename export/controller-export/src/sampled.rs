@@ -113,7 +113,6 @@ pub struct SampledFmu<I: SampledInstance> {
     /// Ticks of the instance; present from initialization on.
     ticks: Option<Box<Ticks<I>>>,
     /// Whether the log has told that ticks lie within steps.
-    #[serde(skip)]
     has_told: bool,
     #[serde(skip)]
     device: Option<Box<I::Device>>,
@@ -250,7 +249,6 @@ impl<I: SampledInstance> Model for SampledFmu<I> {
     }
 
     fn restored(&mut self, from: Restoration<'_, Self>) -> Result<(), Failure> {
-        self.has_told = from.before.has_told;
         let Some(ticks) = self.ticks.as_ref().filter(|_| from.initialized) else { return Ok(()) };
         if let Some(problem) = self.instance.problem(&from.before.instance) {
             return misfit(problem);
