@@ -259,10 +259,9 @@ fn order(experiment: &Experiment) -> Result<Vec<String>, Error> {
             names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
         ));
     }
-    if let Some(name) = names.iter().find(|name| !order.iter().any(|other| other == *name)) {
-        return refuse(format!("[simulation] order does not name the component \"{name}\""));
-    }
-    Ok(order.clone())
+    // Components that the order does not name come last, sorted by name.
+    let others = names.iter().filter(|name| !order.iter().any(|other| other == *name));
+    Ok(order.iter().cloned().chain(others.map(ToString::to_string)).collect())
 }
 
 /// Finds the archive of a component: beside the experiment, in the given folders, or where FMUs are

@@ -97,6 +97,7 @@ pub struct Simulation {
     #[serde(default)]
     pub coupling: Coupling,
     /// Names of components, in the order in which they are stepped from each communication point.
+    /// Components that are left out come last, by name.
     #[serde(default)]
     pub order: Vec<String>,
     /// Component whose FMU may end the simulation before the stop time, for example a vehicle that
