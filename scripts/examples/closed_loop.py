@@ -54,8 +54,7 @@ class Instance:
 
 
 def simulate(controller, stop=50.0, parameters=None, fmus=FMUS):
-    """Steps the loop and returns rows of time, attitude, rate, moment and reference. The parameters
-    are those of the plant."""
+    """Steps a loop with these parameters of the plant. Returns time, attitude, rate, moment, reference."""
     plant = Instance(str(fmus / "ReentryPlant.fmu"), parameters)
     law = Instance(str(fmus / f"{controller}.fmu"))
     # A controller that works faster than the plant proposes would see old inputs.

@@ -38,8 +38,7 @@ class ClosedLoop:
 
     With a controller of the package, or an FMU with the same inputs and outputs, the loop is that
     of the orchestrator bit for bit, and has no delay: in each step the controller gets the state,
-    is stepped, and gives its moment to the plant, which is then stepped. Nothing is read between
-    setting and stepping, as FMI 2.0 requires.
+    is stepped, and gives its moment to the plant, which is then stepped.
 
     >>> with ClosedLoop(controller="LQR") as loop:
     ...     state = loop.step()
@@ -108,8 +107,7 @@ class ClosedLoop:
 
     @classmethod
     def _with_law(cls, paths: dict[str, Path], step: float) -> ClosedLoop:
-        """Opens a loop without a controller, whose reference is that of an FMU. It begins when it
-        is restarted."""
+        """Opens a loop without a controller, with an FMU's reference. It begins when restarted."""
         loop = cls.__new__(cls)
         loop._open(paths, {"plant": {}, "controller": {}}, step, has_controller=False)
         return loop
