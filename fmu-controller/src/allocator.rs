@@ -91,7 +91,12 @@ impl SampledInstance for AllocatorInstance {
         allocator.period()
     }
 
-    fn evaluate(&self, allocator: &mut Allocator, ticks: &mut Ticks<Self>) -> Result<(), Failure> {
+    fn evaluate(
+        &self,
+        allocator: &mut Allocator,
+        ticks: &mut Ticks<Self>,
+        _is_stale: bool,
+    ) -> Result<(), Failure> {
         let command = self.command;
         if !(command.moment.iter().all(|value| value.is_finite())
             && command.dynamic_pressure.is_finite())

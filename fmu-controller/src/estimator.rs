@@ -103,7 +103,12 @@ impl SampledInstance for EstimatorInstance {
         estimator.memory()
     }
 
-    fn evaluate(&self, estimator: &mut Estimator, ticks: &mut Ticks<Self>) -> Result<(), Failure> {
+    fn evaluate(
+        &self,
+        estimator: &mut Estimator,
+        ticks: &mut Ticks<Self>,
+        _is_stale: bool,
+    ) -> Result<(), Failure> {
         let line = self.line;
         if !(line.time.is_finite() && line.readings.iter().flatten().all(|value| value.is_finite()))
         {

@@ -99,7 +99,12 @@ impl SampledInstance for GuidanceInstance {
         PERIOD
     }
 
-    fn evaluate(&self, guidance: &mut Guidance, ticks: &mut Ticks<Self>) -> Result<(), Failure> {
+    fn evaluate(
+        &self,
+        guidance: &mut Guidance,
+        ticks: &mut Ticks<Self>,
+        _is_stale: bool,
+    ) -> Result<(), Failure> {
         let navigation = self.navigation;
         ticks.evaluate_with(navigation, |memory, tick| {
             guidance.update(memory, tick, &navigation);

@@ -152,6 +152,7 @@ impl SampledInstance for NavigationInstance {
         &self,
         navigation: &mut Navigation,
         ticks: &mut Ticks<Self>,
+        _is_stale: bool,
     ) -> Result<(), Failure> {
         let line = self.input.line();
         let time = ticks.next_time();

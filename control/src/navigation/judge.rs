@@ -38,12 +38,13 @@ impl Navigation {
     /// Returns the state at a time (s) that need not be that of the last sample.
     fn state_at(&self, running: &Running, time: f64) -> Option<State> {
         let now = running.last.time;
-        let kept = running.history.at(time, (now, &running.state));
-        if kept.is_some() || (time - now).abs() > CLOCK_RANGE {
-            return kept.filter(|_| time - now <= CLOCK_RANGE);
-        }
+        let is_near = (time - now).abs() <= CLOCK_RANGE;
+        let kept =
+            running.history.at(time, (now, &running.state)).filter(|_| is_near || time < now);
         let felt = running.felt(&running.last);
-        Some(running.state.after(&self.settings.planet, time - now, &felt, &felt).0)
+        let extrapolated =
+            || running.state.after(&self.settings.planet, time - now, &felt, &felt).0;
+        kept.or_else(|| is_near.then(extrapolated))
     }
 
     /// Takes a fix of satellite navigation at its own time, whose position may be that of the fix

@@ -35,43 +35,6 @@ impl<L: Law> ControllerInstance<L> {
     }
 }
 
-impl<L: Law> ControllerInstance<L> {
-    /// Evaluates the first uncommitted tick. Its inputs are `stale` if they were set before it.
-    fn evaluate_with(
-        &self,
-        device: &mut Designed<L>,
-        ticks: &mut Ticks<Self>,
-        stale: bool,
-    ) -> Result<(), Failure> {
-        let Self { settings, input, source, .. } = self;
-        let controller = &mut device.controller;
-        let Input { angles, rates, achieved_moment, known_moment, scheduled, .. } = *input;
-        let turn_rate = input.trajectory.turn_rate(self.parameters.earth_rate);
-        let measured = Measurement {
-            angles,
-            rates,
-            achieved_moment: L::uses_achieved_moment(settings)
-                .then_some(achieved_moment + known_moment),
-            known_moment,
-            scheduled,
-            stale,
-            ..Measurement::default()
-        };
-        let measured = measured.relative_to(&turn_rate);
-        let now = ticks.next_time();
-        let times = [now, now + controller.acts_after()];
-        let preview = source.preview(&self.parameters.reference, times, &input.reference);
-        ticks.evaluate(controller, &measured, &preview);
-        if ticks.in_force().0.iter().all(|value| value.is_finite()) {
-            return Ok(());
-        }
-        Err(Failure::Error(format!(
-            "the control moment at t = {} s is not finite; the attitude may be singular (sideslip angle near 90 deg)",
-            rounded_time(now)
-        )))
-    }
-}
-
 impl<L: Law> SampledInstance for ControllerInstance<L> {
     type Device = Designed<L>;
     type Memory = <Delayed<L::Controller> as Controller>::Memory;
@@ -145,16 +108,38 @@ impl<L: Law> SampledInstance for ControllerInstance<L> {
         device.controller.memory()
     }
 
-    fn evaluate(&self, device: &mut Designed<L>, ticks: &mut Ticks<Self>) -> Result<(), Failure> {
-        self.evaluate_with(device, ticks, false)
-    }
-
-    fn evaluate_stale(
+    fn evaluate(
         &self,
         device: &mut Designed<L>,
         ticks: &mut Ticks<Self>,
+        is_stale: bool,
     ) -> Result<(), Failure> {
-        self.evaluate_with(device, ticks, true)
+        let Self { settings, input, source, .. } = self;
+        let controller = &mut device.controller;
+        let Input { angles, rates, achieved_moment, known_moment, scheduled, .. } = *input;
+        let turn_rate = input.trajectory.turn_rate(self.parameters.earth_rate);
+        let measured = Measurement {
+            angles,
+            rates,
+            achieved_moment: L::uses_achieved_moment(settings)
+                .then_some(achieved_moment + known_moment),
+            known_moment,
+            scheduled,
+            stale: is_stale,
+            ..Measurement::default()
+        };
+        let measured = measured.relative_to(&turn_rate);
+        let now = ticks.next_time();
+        let times = [now, now + controller.acts_after()];
+        let preview = source.preview(&self.parameters.reference, times, &input.reference);
+        ticks.evaluate(controller, &measured, &preview);
+        if ticks.in_force().0.iter().all(|value| value.is_finite()) {
+            return Ok(());
+        }
+        Err(Failure::Error(format!(
+            "the control moment at t = {} s is not finite; the attitude may be singular (sideslip angle near 90 deg)",
+            rounded_time(now)
+        )))
     }
 
     /// With a delay no command acts at the start. The law takes the moment as zero until its first

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::ops::{Deref, DerefMut};
 
 /// Warning at the first tick whose inputs are not those of its instant.
-const LATE: &str = "a tick within a step used inputs that had been set before it: step with the period of the ticks, or with a whole fraction of it";
+const STALE: &str = "a tick within a step used inputs that had been set before it: step with the period of the ticks, or with a whole fraction of it";
 
 /// The ticks of an instance with their memory.
 pub type Ticks<I> = Sampled<
@@ -61,23 +61,17 @@ pub trait SampledInstance: Serialize + DeserializeOwned + Send + Sized + 'static
         Self::Memory::default()
     }
 
-    /// Evaluates the first uncommitted tick with the present inputs.
+    /// Evaluates the first uncommitted tick with the present inputs, which are stale if they were set
+    /// at an earlier instant.
     ///
     /// # Errors
     /// Returns an error that names the input at fault.
-    fn evaluate(&self, device: &mut Self::Device, ticks: &mut Ticks<Self>) -> Result<(), Failure>;
-
-    /// Evaluates the first uncommitted tick with inputs that were set at an earlier instant.
-    ///
-    /// # Errors
-    /// Returns an error that names the input at fault.
-    fn evaluate_stale(
+    fn evaluate(
         &self,
         device: &mut Self::Device,
         ticks: &mut Ticks<Self>,
-    ) -> Result<(), Failure> {
-        self.evaluate(device, ticks)
-    }
+        is_stale: bool,
+    ) -> Result<(), Failure>;
 
     /// Returns the output that is shown at the start time, if it is not that of the first tick
     /// because this tick's output acts later.
@@ -192,11 +186,7 @@ impl<I: SampledInstance> Model for SampledFmu<I> {
         let (instance, device, ticks) = self.parts()?;
         let holds = last == LastEvent::Step && ticks.has_committed();
         if !holds && ticks.is_due(time) {
-            if last == LastEvent::Event {
-                instance.evaluate_stale(device, ticks)?;
-            } else {
-                instance.evaluate(device, ticks)?;
-            }
+            instance.evaluate(device, ticks, last == LastEvent::Event)?;
         }
         if let (Some(device), Some(ticks)) = (&self.device, &self.ticks) {
             let (output, memory) = ticks.in_force();
@@ -224,18 +214,13 @@ impl<I: SampledInstance> Model for SampledFmu<I> {
             let (instance, device, ticks) = self.parts()?;
             let are_current = ticks.is_due(from) && inputs.are_current();
             let is_stale = !are_current && !inputs.are_extrapolated();
-            if is_stale {
-                instance.evaluate_stale(device, ticks)?;
-            } else {
-                instance.evaluate(device, ticks)?;
-            }
+            instance.evaluate(device, ticks, is_stale)?;
             ticks.commit();
-            if is_stale && !std::mem::replace(&mut self.has_told, true) {
-                log(LATE);
-            }
-            let (_, _, ticks) = self.parts()?;
             if let Some(text) = ticks.last_change(I::warning) {
                 log(text);
+            }
+            if is_stale && !std::mem::replace(&mut self.has_told, true) {
+                log(STALE);
             }
         }
     }
